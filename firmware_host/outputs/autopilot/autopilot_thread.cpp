@@ -24,13 +24,13 @@
 namespace swiftlet {
 namespace {
 
-/// Longest sleep: five rounds within a pose's period, an answer to TIMESYNC within one.
+/// Longest sleep. A pose's period has five rounds; TIMESYNC is answered within one.
 constexpr Duration kRound = Duration::fromMilliseconds(5);
 constexpr Duration kObstaclePeriod = Duration::fromMilliseconds(100);
 constexpr Duration kReopenPeriod = Duration::fromMilliseconds(200);
-/// Three heartbeats of an autopilot.
+/// Three heartbeat periods of an autopilot.
 constexpr Duration kSilence = Duration::fromMilliseconds(3000);
-/// Reads of one round: more than a port at 4 Mbaud fills in it.
+/// Most reads per round: more than a port at 4 Mbaud receives in that time.
 constexpr int kMostReads = 8;
 constexpr Duration kFloodPause = Duration::fromMilliseconds(1);
 
@@ -40,11 +40,11 @@ mavlink::StatusText::Severity severityOf(Health health) {
                                      : mavlink::StatusText::Severity::kInfo;
 }
 
-/// The service restarts the program after 5 s (RestartSec), so that each process begins with another number;
-/// the 256 numbers last for 17 minutes.
+/// Shorter than the service's restart delay of 5 s (RestartSec), so that each process begins with another
+/// number; the 256 numbers last for 17 minutes.
 constexpr Duration kResetStep = Duration::fromMilliseconds(4000);
 
-/// With the first reset_counter of this process.
+/// Sets the first reset_counter of this process.
 AutopilotLinkSettings restarted(AutopilotLinkSettings link) {
   link.first_reset = static_cast<std::uint8_t>(monotonicNow().ns / kResetStep.ns);
   return link;
@@ -119,14 +119,15 @@ class AutopilotThread::Work final : public Follower::Work {
  private:
   DeviceFault openOwn() { return options_.outbox == nullptr ? port_.open() : DeviceFault{}; }
 
-  /// A companion may boot before the autopilot: what can heal by itself is looked for in flight, as after an
-  /// unplug. What only the settings can heal ends the program.
+  /// The companion computer may boot before the autopilot: the port is searched for in flight, as after an
+  /// unplug, if it can appear by itself. Faults that only other settings can correct end the program.
   void refuseOrAwait(const DeviceFault& fault) {
     const std::string what = describe(fault, options_.settings.device);
     if (cannotHeal(fault.kind)) {
       throw InputError("settings", 0, "autopilot.device", what, "Or leave it empty to disable the output");
     }
-    // To resolve a name takes seconds, in which the thread would count as lost: a restart tries again.
+    // Resolving a name takes seconds, for which the thread would count as lost. So this ends the program; a
+    // restart tries again.
     if (port_.isUdp() && fault.kind == DeviceFaultKind::kMissing) {
       throw std::runtime_error("autopilot.device: " + what + ". Or give the host's number, as 192.168.1.10");
     }
@@ -142,14 +143,14 @@ class AutopilotThread::Work final : public Follower::Work {
         continue;
       }
       port_.wait(kRound);
-      // More than a port sends is a flood: the CPU is not to be taken by it.
+      // More data than a port sends is a flood, which must not occupy the CPU.
       if (!hear()) sleepFor(kFloodPause);
       takeNews();
       tell();
     }
   }
 
-  /// Silence, faults and TIMESYNC are the matter of whose link it is.
+  /// The link's owner handles silence, faults and TIMESYNC.
   void runOnAnothersLink(const LinkOutbox& outbox) {
     while (thread_.turn()) {
       sleepFor(kRound);
@@ -172,7 +173,7 @@ class AutopilotThread::Work final : public Follower::Work {
     journal_.works(heard_);
   }
 
-  /// False: there was more than a round reads.
+  /// False: more data was waiting than one round reads.
   bool hear() {
     std::array<std::uint8_t, MavlinkParser::kMostFed> bytes;
     int reads = 0;
@@ -215,7 +216,7 @@ class AutopilotThread::Work final : public Follower::Work {
     if (options_.settings.obstacles) tellObstacles();
   }
 
-  /// A text in fixed memory; AutopilotLink cuts it at the same length.
+  /// Sends a text from fixed memory; AutopilotLink cuts texts at the same length.
   template <typename... Arguments>
   void say(mavlink::StatusText::Severity severity, fmt::format_string<Arguments...> format,
            Arguments&&... arguments) {
@@ -226,7 +227,7 @@ class AutopilotThread::Work final : public Follower::Work {
   }
 
   void takeVerdict(Stamp now) {
-    state_.health = worse(own_health_, Health::kDegraded);  // unless a supervisor knows more
+    state_.health = worse(own_health_, Health::kDegraded);  // unless the supervisor says otherwise
     if (outlet_.verdict.refresh() == 0) return;
     const Verdict& verdict = outlet_.verdict.value();
     const bool supervised = !verdict.stale(now) || verdict.ending;
@@ -239,7 +240,7 @@ class AutopilotThread::Work final : public Follower::Work {
       }
     }
     if (!supervised) return;
-    // An initialization is over when a state says so: the verdict is up to a period older.
+    // Whether initialization is over is taken from the state: the verdict may be one period older.
     const bool worsens = verdict.health == Health::kDegraded || verdict.health == Health::kFailed;
     state_.health = worsens ? worse(own_health_, verdict.health) : own_health_;
     tellTroubles(verdict);
@@ -278,7 +279,8 @@ class AutopilotThread::Work final : public Follower::Work {
     }
   }
 
-  /// What poses say by quality -1 and silence, in words, also where nobody supervises.
+  /// Reports missing states as text, in addition to the poses' quality -1 and silence. Works without a
+  /// supervisor.
   void watchStates(Stamp now) {
     if (number_ == 0) return;
     const bool stopped = now - state_came_ > AutopilotLink::kSilence && !outlet_.verdict.value().ending;
@@ -294,12 +296,12 @@ class AutopilotThread::Work final : public Follower::Work {
   void tellObstacles() {
     const Stamp now = monotonicNow();
     if (number_ == 0 || now < next_obstacles_ || outlet_.mesh.refresh() == 0) return;
-    // By the rate on the mean, and never two at once after a pause.
+    // Keeps the rate on average, without sending two in a row after a pause.
     next_obstacles_ = std::max(next_obstacles_ + kObstaclePeriod, now + Duration{kObstaclePeriod.ns / 2});
     const Stamp stamp = onHost(outlet_.mesh.value().stamp);
     if (now - stamp > kOldestObstacles || now - state_.stamp > AutopilotLink::kOldest) return;
-    // A mesh that stands is told again as long as it is fresh, seen from where the vehicle is by now. Both
-    // are in the run's clock.
+    // The same mesh is sent again while it is fresh, seen from the vehicle's current position. Mesh and state
+    // are on the run's clock.
     if (auto message = obstacleDistanceOf(outlet_.mesh.value(), outlet_.state.value().state(), mounting_)) {
       message->time_usec = static_cast<std::uint64_t>(stamp.ns / kNanosecondsPerMicrosecond);
       link_.show(*message);
@@ -348,16 +350,16 @@ class AutopilotThread::Work final : public Follower::Work {
   DeviceJournal journal_;
   AutopilotLink link_;
   LinkPort port_;
-  NavState state_;  ///< stamp of CLOCK_MONOTONIC
+  NavState state_;  ///< its stamp is of CLOCK_MONOTONIC
   Eigen::Vector3d omega_body_ = Eigen::Vector3d::Zero();
   std::optional<Duration> to_host_;
-  Health own_health_ = Health::kInitializing;  ///< that the state says of itself
-  Health health_ = Health::kInitializing;      ///< of the verdict, told last
+  Health own_health_ = Health::kInitializing;  ///< health of the state itself
+  Health health_ = Health::kInitializing;      ///< health of the verdict sent last
   bool supervised_ = true, states_stopped_ = false;
   Troubles told_;
-  std::uint64_t number_ = 0;                         ///< of the newest state taken
-  std::uint32_t reasons_ = 0, trouble_changes_ = 0;  ///< told
-  std::uint64_t frames_ = 0;                         ///< heard
+  std::uint64_t number_ = 0;                         ///< number of the newest state taken
+  std::uint32_t reasons_ = 0, trouble_changes_ = 0;  ///< numbers of the changes sent last
+  std::uint64_t frames_ = 0;                         ///< counter of frames received
   Stamp state_came_;
   Stamp heard_;
   Stamp next_obstacles_;

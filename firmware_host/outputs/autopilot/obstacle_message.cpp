@@ -13,7 +13,7 @@ static_assert(kObstacleSectors == mavlink::ObstacleDistance::kSectors);
 
 constexpr float kCentimetres = 100;
 constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
-/// What touches the vehicle is told as one step away: readers leave 0, and what is below the minimum, out.
+/// Contact is reported as 1 cm: readers ignore 0 and values below the minimum.
 constexpr std::uint16_t kNearest_cm = 1;
 constexpr auto kFarthest_cm = static_cast<std::uint16_t>(kObstacleReach * kCentimetres);
 constexpr std::uint16_t kNothingThere = kFarthest_cm + 1;
@@ -36,7 +36,7 @@ std::optional<mavlink::ObstacleDistance> obstacleDistanceOf(const LocalMesh& mes
   SectorQuery query;
   query.origin = (T.translation + T.R() * mounting.p_body_vehicle).cast<float>();
   query.heading = static_cast<float>(std::atan2(forward.y(), forward.x()));
-  query.reach = std::numeric_limits<float>::max();  // what is far is known too
+  query.reach = std::numeric_limits<float>::max();  // to tell far surfaces, reported as free, from unknown
   const SectorDistances nearest = nearestBySector(mesh, query);
 
   mavlink::ObstacleDistance message;

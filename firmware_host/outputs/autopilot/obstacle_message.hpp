@@ -16,14 +16,15 @@
 
 namespace swiftlet {
 
-/// Older meshes say nothing about now.
+/// Older meshes are not sent.
 inline constexpr Duration kOldestObstacles = Duration::fromMilliseconds(500);
 
-/// [m] Farther triangles are too uncertain to give a figure.
+/// [m] The position of farther triangles is too uncertain to report.
 inline constexpr float kObstacleReach = 20;
 
-/// Empty: the mesh is of another epoch, or older than kOldestObstacles at `state`, or the state is none to
-/// fly on, and so says nothing of where the mesh is seen from. The stamp is the mesh's.
+/// Empty if the mesh is of another epoch, if it is older than kOldestObstacles at `state`, or if the state's
+/// health does not allow flight, so that the vehicle's position relative to the mesh is unknown. The message
+/// has the mesh's stamp.
 std::optional<mavlink::ObstacleDistance> obstacleDistanceOf(const LocalMesh& mesh, const NavState& state,
                                                             const AutopilotMounting& mounting);
 

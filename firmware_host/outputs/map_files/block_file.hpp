@@ -1,6 +1,6 @@
 #pragma once
-// The map's blocks on disk during a run: a file in the run folder without a name (it is unlinked when
-// opened), so nothing is left behind.
+// The map's blocks on disk during a run. The file in the run folder is unlinked right after it is opened, so
+// nothing is left behind.
 //
 // Host side; used by the thread `map`, then by the writer of the map. Errors: if the file cannot be created
 // or is full, the block is refused and counted by StoredBlocks; the flight continues.
@@ -13,7 +13,7 @@ namespace swiftlet {
 
 class BlockFile : public BlockStorage {
  public:
-  /// The file is made in `folder`, with the first block. Empty: no file, every block is refused.
+  /// The file is created in `folder` with the first block. Empty: no file, every block is refused.
   explicit BlockFile(std::string folder) : folder_(std::move(folder)) {}
   ~BlockFile() override;
   BlockFile(const BlockFile&) = delete;

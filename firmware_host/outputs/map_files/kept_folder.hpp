@@ -1,6 +1,6 @@
 #pragma once
-// A kept map as a folder: graph.swg (kept_graph_file.hpp) and, where a volume was fused, volume.swm
-// (kept_map.hpp). The folder is there as a whole or not at all (new_folder.hpp).
+// A kept map as a folder: graph.swg (kept_graph_file.hpp) and, if a volume was fused, volume.swm
+// (kept_map.hpp). The folder appears completely or not at all (new_folder.hpp).
 
 #include <functional>
 #include <string>
@@ -16,16 +16,16 @@ inline constexpr const char* kKeptVolumeFile = "volume.swm";
 
 class KeptFolder {
  public:
-  /// InputError if there is something of that name already, or nothing can be made there.
+  /// InputError if `path` already exists or cannot be created.
   explicit KeptFolder(const std::string& path) : folder_(path, {kKeptGraphFile, kKeptVolumeFile}) {}
 
-  /// InputError if they cannot be written.
+  /// InputError if the data cannot be written.
   void write(const KeptGraph& graph);
   void write(MapStage& map, const std::function<bool(std::uint32_t epoch)>& wanted);
   void write(const VoxelVolume& volume, double least_weight);
-  /// For files without a name while it is filled.
+  /// Folder for unnamed temporary files while the map is being written.
   [[nodiscard]] std::string folder() const { return folder_.file(""); }
-  /// Also where no graph was written.
+  /// Makes the folder appear under its name, even if no graph was written.
   void commit();
 
  private:
@@ -33,10 +33,10 @@ class KeptFolder {
   bool has_graph_ = false;
 };
 
-/// InputError if the folder holds no sound graph.
+/// InputError if the folder holds no valid graph.
 KeptGraph readKeptFolder(const std::string& path);
 
-/// The volume of a kept map: `path` itself, or in the folder of that name.
+/// The volume file of a kept map: `path` itself, or the file in the folder `path`.
 std::string keptVolumeOf(const std::string& path);
 
 }  // namespace swiftlet

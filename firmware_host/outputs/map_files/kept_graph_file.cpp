@@ -22,16 +22,16 @@ constexpr std::uint32_t kGraphVersion = 1;
 /// Magic, version, nodes, loops, camera.
 constexpr std::size_t kGraphHeadBytes = 8 + 3 * 4 + kCameraBytes;
 constexpr std::size_t kGraphCovarianceBytes = 21 * 8;
-/// Stamp, pose, up, tilt's covariance, flags, relative pose with covariance, number of features.
+/// Stamp, pose, up, covariance of the tilt, flags, relative pose with covariance, number of features.
 constexpr std::size_t kGraphNodeBytes = 8 + 7 * 8 + 3 * 8 + 6 * 8 + 4 + 7 * 8 + kGraphCovarianceBytes + 4;
 constexpr std::size_t kGraphFeatureBytes = 32 + 7 * 4 + 4;
 constexpr std::size_t kGraphLoopBytes = 2 * 4 + 7 * 8 + kGraphCovarianceBytes;
 constexpr std::size_t kGraphCrcBytes = 4;
 constexpr std::uint32_t kGraphLinked = 1;
 
-// What passes for a unit: doubles and floats as written by programs that rounded them.
+// Tolerance for unit vectors, which other programs may have rounded when writing.
 constexpr double kUnitTolerance = 1e-3;
-// Far beyond any building; a number above it is damage.
+// Far beyond any building; a larger number means damage.
 constexpr double kFar = 1e6;  // m
 constexpr int kMostOctaves = 16;
 

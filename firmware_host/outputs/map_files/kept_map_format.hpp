@@ -1,9 +1,9 @@
 #pragma once
 // The layout of a kept map, shared by writer and reader; docs/formats.md has the tables.
 //
-// A head of kKeptHeadBytes, then records back to back: kKeptRecordBytes and a payload. Numbers are
-// little-endian, doubles and floats their IEEE 754 bits. The CRCs of records continue from the head's, so
-// that a record of another map does not pass for one of this.
+// A head of kHeadBytes, then records back to back: kRecordBytes and a payload. Numbers are little-endian;
+// doubles and floats are IEEE 754. The CRC of each record continues from the head's, so that a record of
+// another map is never accepted.
 
 #include <algorithm>
 #include <array>
@@ -19,12 +19,13 @@
 
 namespace swiftlet::kept {
 
-/// As a recording's (recording_format.hpp), for maps.
+/// Same scheme as a recording's magic (recording_format.hpp).
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'S', 'W', 'M', '\r', '\n', 0x1A, '\n'};
 inline constexpr std::uint32_t kVersion = 3;
-/// Before it, patches of the surface followed, and their number stood in place of its least weight.
+/// Had surface patches after the blocks; their number stood in place of the surface's least weight.
 inline constexpr std::uint32_t kVersionWithPatches = 2;
-/// Blocks were free as a whole or not at all: in place of their parts, the images that saw them so.
+/// Blocks were free as a whole or not at all: the number of images that saw them free stood in place of their
+/// free parts.
 inline constexpr std::uint32_t kVersionOfWholeBlocks = 1;
 inline constexpr std::size_t kHeadBytes = 96;
 inline constexpr std::size_t kHeadCrcAt = kHeadBytes - sizeof(std::uint32_t);
@@ -38,11 +39,11 @@ inline constexpr std::size_t kIndexBytes = 12;
 /// Index, sides, three zeros, drift, then distances, weights, grey values.
 inline constexpr std::size_t kBlockBytes = kIndexBytes + 8 + kBlockVoxels * 5;
 inline constexpr std::size_t kLabelBytes = kBlockVoxels * 8;
-/// Index, the parts that were seen free.
+/// Index, parts seen as free.
 inline constexpr std::size_t kFreeBytes = kIndexBytes + 8;
 inline constexpr std::size_t kFreeBytesOfWholeBlocks = kIndexBytes + 4;
-inline constexpr std::size_t kMostFree = 256;  ///< in a record
-/// Of a patch: its index and counts, vertices, triangles.
+inline constexpr std::size_t kMostFree = 256;  ///< per record
+/// Size of a patch: index, counts, vertices, triangles.
 inline constexpr std::size_t kMostPayload =
     kIndexBytes + 4 + kMostPatchVertices * 18 + kMostPatchTriangles * 6;
 static_assert(kMostPayload >= kBlockBytes + kLabelBytes && kMostPayload >= kMostFree * kFreeBytes);
@@ -58,7 +59,7 @@ struct Head {
   double least_weight = SurfaceSettings{}.least_weight;
 };
 
-/// The order of blocks in a file: nearest to the vehicle's block first, ties by key.
+/// Order of blocks in a file: by distance from the vehicle's block, ties by key.
 struct Nearness {
   std::uint64_t squared = 0;  ///< blocks^2
   std::uint64_t key = 0;

@@ -26,7 +26,8 @@ struct ReadBlock : StoredBlock {
   float drift = 0;
 };
 
-/// Takes what a file holds, in its order; this one only lets the reader check it.
+/// Receives the content of a file in its order. This base class ignores it, so that the reader only checks
+/// the file.
 class MapTaker {
  public:
   virtual ~MapTaker() = default;
@@ -34,8 +35,8 @@ class MapTaker {
   virtual void freeBlock(ReadBlock& /*block*/) {}
 };
 
-/// One pass over a file: each record is read whole, its checksum and then its values looked at, and given
-/// away.
+/// One pass over a file: each record is read completely, its checksum and then its values are checked, and it
+/// is handed over.
 class MapReader {
  public:
   MapReader(const std::string& name, std::istream& in)
@@ -63,7 +64,7 @@ class MapReader {
   Kind readRecord();
   void readBlock(MapTaker& taker);
   void readFree(MapTaker& taker);
-  /// Of the payload in hand, where a part of it lies in the file.
+  /// Position in the file of a part of the current payload.
   [[nodiscard]] std::uint64_t at(std::size_t in_payload) const { return record_ + kRecordBytes + in_payload; }
   BlockIndex readIndex(LittleEndianReader& from, std::size_t in_payload);
   [[nodiscard]] LittleEndianReader payload() const {
@@ -73,15 +74,15 @@ class MapReader {
   const std::string& name_;
   std::istream& in_;
   std::uint64_t size_ = 0;
-  std::uint64_t next_ = 0;    ///< byte to read
-  std::uint64_t record_ = 0;  ///< first byte of the record in hand
-  std::size_t length_ = 0;    ///< of its payload
+  std::uint64_t next_ = 0;    ///< next byte to read
+  std::uint64_t record_ = 0;  ///< first byte of the current record
+  std::size_t length_ = 0;    ///< of the current payload
   std::vector<std::uint8_t> bytes_;
   std::uint32_t version_ = 0;
   Head head_;
   BlockIndex vehicle_;
   std::uint32_t head_crc_ = 0;
-  std::optional<Nearness> last_;  ///< of the kind in hand
+  std::optional<Nearness> last_;  ///< of the current kind of record
   KeptMapCounts found_;
   std::unique_ptr<ReadBlock> block_;
 };
@@ -275,7 +276,7 @@ void MapReader::readFree(MapTaker& taker) {
   }
 }
 
-/// Into an empty volume: what comes later lies farther, and where room ends goes to the submaps.
+/// Loads into an empty volume. Later blocks are farther away; when the volume is full they go to the submaps.
 class Loader final : public MapTaker {
  public:
   Loader(VoxelVolume& volume, MapSubmaps* submaps, const Eigen::Vector3d& p_map_vehicle,
@@ -315,7 +316,7 @@ class Loader final : public MapTaker {
   }
 
   VoxelVolume& volume_;
-  MapSubmaps* submaps_;  ///< null: nobody has room
+  MapSubmaps* submaps_;  ///< null: blocks without room are only counted
   Eigen::Vector3f vehicle_;
   KeptMapReport& report_;
 };
@@ -328,7 +329,7 @@ std::ifstream opened(const std::string& path) {
   return in;
 }
 
-/// Memory that holds all of it.
+/// Settings of a volume with enough memory for the whole map.
 VolumeSettings settingsOf(const Head& head) {
   VolumeSettings settings;
   settings.voxel_size = head.voxel_size;

@@ -171,7 +171,7 @@ KeptMapCounts writeKeptMapFile(const std::string& path, const MapParts& map) {
   WholeFile file(path);
   IntoWholeFile buffer(file);
   std::ostream out(&buffer);
-  out.exceptions(std::ios::badbit);  // lets the file's own error through
+  out.exceptions(std::ios::badbit);  // rethrows the file's own exceptions
   const KeptMapCounts counts = writeKeptMap(path, out, map);
   file.commit();
   return counts;

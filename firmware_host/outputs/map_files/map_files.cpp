@@ -49,7 +49,7 @@ constexpr std::uint32_t kGlbVersion = 2;
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;
 constexpr std::size_t kChunkAlignment = 4;
-// Numbers of the specification.
+// Component types of the glTF specification.
 constexpr int kFloat = 5126;
 constexpr int kUnsignedInt = 5125;
 constexpr int kUnsignedByte = 5121;
@@ -57,7 +57,7 @@ constexpr int kVertexBuffer = 34962;
 constexpr int kIndexBuffer = 34963;
 constexpr int kTriangles = 4;
 
-/// Gathers the binary chunk and what the JSON says of it.
+/// Collects the binary chunk and the JSON that describes it.
 class GlbBuilder {
  public:
   template <typename AddAll>
@@ -77,7 +77,7 @@ class GlbBuilder {
   Json& last() { return accessors_.back(); }
 
   void write(const std::string& path, const Json& primitive) {
-    // The map has z up, glTF y up: a quarter turn about x.
+    // The map has z up, glTF has y up: a quarter turn about x.
     const double half = std::sqrt(0.5);
     Json json = {{"asset", {{"version", "2.0"}, {"generator", "swiftlet"}}},
                  {"scene", 0},
@@ -119,7 +119,7 @@ std::array<std::uint8_t, 4> shown(const MapMesh& mesh, std::size_t i) {
   const std::uint8_t grey = mesh.grey[i];
   if (mesh.labels[i] == 0) return {grey, grey, grey, 255};
   const std::array<std::uint8_t, 3> colour = labelColour(mesh.labels[i]);
-  // A dark picture must not hide the label: between half and full brightness.
+  // Brightness between half and full, so that dark images do not hide the label.
   const auto part = [grey](std::uint8_t c) { return static_cast<std::uint8_t>(c * (255 + grey) / 510); };
   return {part(colour[0]), part(colour[1]), part(colour[2]), 255};
 }
@@ -127,7 +127,7 @@ std::array<std::uint8_t, 4> shown(const MapMesh& mesh, std::size_t i) {
 }  // namespace
 
 std::array<std::uint8_t, 3> labelColour(std::uint8_t label) {
-  // Hues a golden angle apart: neighbours in number are far apart in colour.
+  // Hues differ by the golden angle, so that consecutive labels have different colours.
   const double hue = std::fmod(static_cast<double>(label) * 0.618033988749895, 1.0) * 6;
   const double lightness = label % 2 == 0 ? 0.75 : 1.0;
   std::array<std::uint8_t, 3> colour{};
@@ -170,7 +170,7 @@ void writeMapPly(const std::string& path, const MapMesh& mesh) {
 
 void writeMapGlb(const std::string& path, const MapMesh& mesh) {
   if (mesh.faces.empty()) {
-    // Accessors without elements are not allowed: an empty scene says that nothing was mapped.
+    // Accessors without elements are not allowed, so an empty map becomes an empty scene.
     Json json = {{"asset", {{"version", "2.0"}, {"generator", "swiftlet"}}},
                  {"scene", 0},
                  {"scenes", {{{"name", "empty"}}}}};
@@ -204,7 +204,7 @@ void writeMapGlb(const std::string& path, const MapMesh& mesh) {
   attributes["COLOR_0"] = glb.accessor(n, kUnsignedByte, "VEC4", true, kVertexBuffer, [&](Bytes& out) {
     for (std::size_t i = 0; i < n; ++i) out.add(shown(mesh, i));
   });
-  // Four bytes a vertex, as the format aligns them; the last two are spare.
+  // Four bytes per vertex, as the format's alignment requires; the last two are unused.
   attributes["_LABEL"] = glb.accessor(n, kUnsignedByte, "VEC4", false, kVertexBuffer, [&](Bytes& out) {
     for (std::size_t i = 0; i < n; ++i) {
       out.add(std::array<std::uint8_t, 4>{mesh.labels[i], mesh.probabilities[i], 0, 0});

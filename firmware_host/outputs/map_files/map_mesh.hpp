@@ -1,9 +1,9 @@
 #pragma once
-// The map's surface as files hold it: any size, on the host side only.
+// The map's surface as stored in files: any size, only on the host side.
 //
-// Metres, map axes (z up). Triangles are counter-clockwise seen from the free side. Every list of the
-// vertices has one value for each; a face's label is that of the most of its corners, unlabelled corners left
-// out.
+// Metres, map axes (z up). Triangles are counter-clockwise seen from the free side. Every list of vertex
+// properties has one value per vertex. A face's label is the most frequent one of its corners, ignoring
+// unlabelled corners.
 
 #include <Eigen/Core>
 #include <array>

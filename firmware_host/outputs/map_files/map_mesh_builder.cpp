@@ -33,7 +33,7 @@ MapMesh MapMeshBuilder::mesh() const {
     }
     for (const SurfaceTriangle& triangle : patch.triangles) {
       const std::array<std::uint32_t, 3> face{joined[triangle[0]], joined[triangle[1]], joined[triangle[2]]};
-      // Corners that fell into one leave a line.
+      // A triangle with merged corners has no area.
       if (face[0] == face[1] || face[1] == face[2] || face[2] == face[0]) continue;
       mesh.faces.push_back(face);
     }

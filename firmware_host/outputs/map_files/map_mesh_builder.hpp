@@ -1,5 +1,5 @@
 #pragma once
-// One mesh of a surface's patches.
+// Makes one mesh from a surface's patches.
 
 #include <map>
 #include <vector>
@@ -11,11 +11,11 @@
 namespace swiftlet {
 
 /// Joins the patches of a surface into one mesh: vertices of neighbouring patches at bit-identical positions
-/// become one. Memory grows with the mesh, some 60 bytes a vertex.
+/// are merged. Memory grows with the mesh, some 60 bytes per vertex.
 class MapMeshBuilder : public SurfaceSink {
  public:
   void take(const SurfacePatch& patch) override;
-  /// All patches taken, in the order of their blocks.
+  /// The mesh of all patches so far, in the order of their blocks.
   [[nodiscard]] MapMesh mesh() const;
 
  private:

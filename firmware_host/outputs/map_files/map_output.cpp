@@ -13,7 +13,7 @@
 namespace swiftlet {
 namespace {
 
-/// What became of depth images and blocks.
+/// Counters of depth images and blocks.
 nlohmann::ordered_json toJson(const MapStage& map) {
   const MapCounters& stage = map.counters();
   const IntegratorCounters& images = map.integrator().counters();
@@ -99,7 +99,7 @@ nlohmann::ordered_json writeMap(const std::string& folder, MapStage& map,
     writeMapPly((path / name).string(), part);
     json["epochs_apart"].push_back({{"file", name}, {"faces", part.faces.size()}});
   }
-  json["submaps"]["reads_failed"] = map.submaps().stored().readsFailed();  // those above too
+  json["submaps"]["reads_failed"] = map.submaps().stored().readsFailed();  // includes the reads above
   return json;
 }
 

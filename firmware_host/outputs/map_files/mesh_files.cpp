@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-/// Returns the folder's path.
+/// Recreates the folder for the meshes and returns its path.
 std::string madeAnew(const std::string& run_folder) {
   const std::filesystem::path folder = std::filesystem::path(run_folder) / "meshes";
   std::error_code error;
@@ -52,7 +52,7 @@ std::string MeshSequenceWriter::writeFile(const char* kind, std::uint64_t frame,
                                           const LocalMesh& mesh) const {
   if (mesh.faces.empty()) return {};
   std::string name = fmt::format("{}_{:06}.ply", kind, frame);
-  // Two waits for the disk a frame would hold up the thread that writes them.
+  // Not synced: two waits for the disk per frame would hold up the writing thread.
   writePly(folder_ + "/" + name, toTriangleMesh(mesh), WholeFile::Sync::kNo);
   return name;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The meshes of a run in its folder: `local_mesh.ply`, and on request every mesh in `meshes/`.
+// Writes the meshes of a run to its folder: `local_mesh.ply`, and on request every mesh to `meshes/`.
 //
 // meshes/frames.csv has one row per frame: index, stamp [ns], keyframe (0 or 1), the files of its frame mesh
 // and its horizon mesh (in the same folder; empty if there is none or it has no face), and the convex hull of
@@ -20,7 +20,7 @@ TriangleMesh toTriangleMesh(const LocalMesh& mesh);
 
 class MeshSequenceWriter {
  public:
-  /// Makes `meshes/` in the run folder; meshes of an earlier run there are removed.
+  /// Creates `meshes/` in the run folder, removing meshes of an earlier run.
   explicit MeshSequenceWriter(const std::string& run_folder);
 
   /// `horizon`: null between keyframes.

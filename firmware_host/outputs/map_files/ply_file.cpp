@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint8_t kGreyOfNone = 128;
 constexpr std::size_t kCorners = 3;
 constexpr double kMaxByte = 255;
-// Luma of BT.601, as grey pictures are made.
+// Luma of BT.601.
 constexpr double kRedWeight = 0.299;
 constexpr double kGreenWeight = 0.587;
 constexpr double kBlueWeight = 0.114;
@@ -75,7 +75,7 @@ class MeshReader {
     if (face != nullptr && face->count > 0 && std::ranges::count_if(face->properties, isIndices) != 1) {
       throw InputError(name_, 0, "face vertex_indices", "no such list", "Give a mesh of triangles");
     }
-    // The header's counts were found to fit into the file.
+    // The header's counts have been checked against the file's size.
     mesh_.vertices.reserve(vertex->count);
     mesh_.grey.reserve(has_colour_ ? vertex->count : 0);
     mesh_.faces.reserve(face == nullptr ? 0 : face->count);

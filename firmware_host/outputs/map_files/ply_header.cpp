@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-// Above what any program writes; they bound the work that a header alone can ask for.
+// More than any program writes; limits the work that a header alone can cause.
 constexpr int kMaxHeaderLines = 1000;
 constexpr std::size_t kMaxProperties = 64;  ///< of one element
 constexpr const char* kBadHeader = "Check that it is a complete PLY file";
@@ -60,7 +60,7 @@ class HeaderReader {
     throw InputError(name_, header_.lines, field, message, remedy);
   }
 
-  /// Without its end; the header must not end before `end_header`.
+  /// The next line without its line end; fails if the header ends before `end_header`.
   std::string_view nextLine() {
     ++header_.lines;
     const std::size_t end = rest_.find('\n');
@@ -147,8 +147,8 @@ class HeaderReader {
     properties.push_back(property);
   }
 
-  /// What one row needs at least: its values and the lengths of its lists. In ASCII each is a digit with
-  /// a blank or line end behind it.
+  /// Minimum size of a row: its values and the lengths of its lists. In ASCII, each has at least one digit
+  /// and a blank or line end.
   [[nodiscard]] std::uint64_t leastBytes(const PlyElement& element) const {
     std::uint64_t bytes = 0;
     for (const PlyProperty& property : element.properties) {
@@ -159,7 +159,7 @@ class HeaderReader {
   }
 
   void checkCounts() const {
-    // The last line of an ASCII file may lack its end.
+    // The last line of an ASCII file may lack a line end.
     std::uint64_t left = rest_.size() + (header_.binary ? 0 : 1);
     for (const PlyElement& element : header_.elements) {
       const std::uint64_t least = leastBytes(element);

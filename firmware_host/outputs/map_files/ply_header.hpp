@@ -1,5 +1,5 @@
 #pragma once
-// The header of a PLY file: which elements with which properties follow, how often, in which encoding.
+// The header of a PLY file: elements, their properties, their counts, and the encoding.
 
 #include <cstdint>
 #include <string>
@@ -10,7 +10,7 @@ namespace swiftlet {
 
 enum class PlyType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 
-/// What `with` makes of a number of this type.
+/// Returns `with` applied to a number of this type.
 template <typename With>
 auto withNumber(PlyType type, const With& with) {
   switch (type) {
@@ -41,7 +41,7 @@ struct PlyProperty {
   std::string name;
   PlyType type = PlyType::kFloat;
   bool is_list = false;
-  PlyType count_type = PlyType::kUint8;  ///< of a list's length
+  PlyType count_type = PlyType::kUint8;  ///< type of a list's length
 };
 
 struct PlyElement {
@@ -53,11 +53,11 @@ struct PlyElement {
 struct PlyHeader {
   bool binary = false;
   std::vector<PlyElement> elements;
-  std::size_t size = 0;  ///< bytes up to the body
+  std::size_t size = 0;  ///< bytes before the body
   int lines = 0;
 };
 
-/// InputError with the line when this is no header, or its counts ask for more than `bytes` can hold.
+/// InputError with the line if this is not a header, or if its counts need more than `bytes`.
 PlyHeader readPlyHeader(const std::string& name, std::string_view bytes);
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// The numbers after a PLY header, one by one, in any encoding.
+// Reads the numbers after a PLY header one by one, in any encoding.
 
 #include <string>
 #include <string_view>
@@ -11,20 +11,20 @@ namespace swiftlet {
 
 class PlyValues {
  public:
-  /// All three must outlive the reader.
+  /// `name`, `bytes` and `header` must outlive the reader.
   PlyValues(const std::string& name, std::string_view bytes, const PlyHeader& header);
 
-  /// Before and behind every row: in ASCII a row is a line, blank lines do not count.
+  /// Call before and after every row. In ASCII a row is a line; blank lines are skipped.
   void beginRow(const PlyElement& element, std::uint64_t index);
   void endRow();
-  /// The next number of the row, which `type` can hold; NaN and infinity are numbers here.
+  /// The next number of the row; refused if `type` cannot hold it. NaN and infinity are accepted here.
   double next(PlyType type, std::string_view property);
   /// A list's length.
   std::uint64_t nextLength(PlyType type, std::string_view property);
-  /// When all rows are read: nothing but blanks may follow.
+  /// After all rows: only blanks may follow.
   void finish();
 
-  /// Names the row's line or the last value's byte.
+  /// Error that names the row's line or the last value's byte.
   [[nodiscard]] InputError error(std::string_view property, const std::string& message,
                                  const std::string& remedy) const;
 
@@ -36,10 +36,10 @@ class PlyValues {
   const std::string& name_;
   std::string_view bytes_;
   bool binary_;
-  std::size_t at_ = 0;    ///< of the next byte
-  std::size_t from_ = 0;  ///< of the last value
+  std::size_t at_ = 0;    ///< position of the next byte
+  std::size_t from_ = 0;  ///< position of the last value
   int line_ = 0;
-  std::string_view row_;  ///< what is left of the line
+  std::string_view row_;  ///< rest of the line
   const PlyElement* element_ = nullptr;
   std::uint64_t index_ = 0;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// A triangle mesh as in files: any size, host side only.
+// A triangle mesh as stored in files: any size, only on the host side.
 //
 // Metres, in the world frame of its source. A face is counter-clockwise seen from outside (true surfaces) or
 // from the side it was observed from (the mesher's). `grey` has one value per vertex and `labels` one per

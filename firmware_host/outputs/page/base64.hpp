@@ -8,7 +8,7 @@ namespace swiftlet {
 
 std::string base64(std::span<const unsigned char> bytes);
 
-/// Of numbers as they lie in memory (little-endian).
+/// Encodes numbers as they are in memory (little-endian).
 template <typename T>
 std::string base64Of(std::span<const T> values) {
   return base64({reinterpret_cast<const unsigned char*>(values.data()), values.size_bytes()});

@@ -12,7 +12,7 @@
 namespace swiftlet {
 namespace {
 
-/// Stands in the page where the document goes.
+/// Placeholder of the document in the page.
 constexpr std::string_view kPlace = "<!--swiftlet-report-document-->";
 
 }  // namespace
@@ -30,7 +30,7 @@ ReportProgram readReportProgram() {
 
 namespace {
 
-/// `page` with `text` in the document's place.
+/// `page` with `text` in place of the placeholder.
 std::string filled(const std::string& page, const std::string& name, std::string_view text) {
   const std::size_t at = page.find(kPlace);
   if (at == std::string::npos) {
@@ -48,7 +48,7 @@ std::string filled(const std::string& page, const std::string& name, std::string
 
 std::string pageWith(const std::string& page, const std::string& name,
                      const nlohmann::ordered_json& document) {
-  // Text of files may hold what ends a script element; bytes that are no UTF-8 are replaced.
+  // Texts from files may contain the end tag of a script element; invalid UTF-8 is replaced.
   const std::string json = document.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   std::string text = R"(<script type="application/json" id="report-document">)";
   for (const char c : json) {

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 using Cell = std::array<std::int64_t, 3>;
 
-/// Corners by their cell of a grid: which new corner each becomes.
+/// Vertices grouped by grid cell: `group` gives the new vertex of each.
 struct Grouping {
   std::vector<std::uint32_t> group;
   std::size_t count = 0;
@@ -27,7 +27,7 @@ Grouping groupOf(const TriangleMesh& mesh, double width) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Eigen::Vector3d at = mesh.vertices[i].cast<double>() / width;
     for (int axis = 0; axis < 3; ++axis) {
-      constexpr double kFar = 1e15;  // what a damaged file may hold still fits a whole number
+      constexpr double kFar = 1e15;  // values of damaged files must still fit an integer
       cells[i].first[static_cast<std::size_t>(axis)] =
           static_cast<std::int64_t>(std::floor(std::clamp(at[axis], -kFar, kFar)));
     }
@@ -57,7 +57,7 @@ TriangleMesh joined(const TriangleMesh& mesh, const Grouping& grouping) {
   if (!mesh.grey.empty()) {
     for (const float value : grey) thin.grey.push_back(static_cast<std::uint8_t>(std::lround(value)));
   }
-  // One of the triangles that fall together stays, whatever their corners' order.
+  // Of triangles that become equal, one is kept, whatever the order of their corners.
   std::map<std::array<std::uint32_t, 3>, bool> taken;
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
     std::array<std::uint32_t, 3> face{};
@@ -98,7 +98,7 @@ void addPoints(Json& json, std::span<const Eigen::Vector3f> points) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  constexpr float kLeast = 1e-6F;  // m: a flat one has no width
+  constexpr float kLeast = 1e-6F;  // m; a flat surface has no extent
   constexpr float kSteps = 65535;
   const Eigen::Vector3f size = (high - low).cwiseMax(kLeast);
   std::vector<std::uint16_t> steps;
@@ -127,7 +127,7 @@ Json surfaceJson(const char* id, const char* name, const TriangleMesh& whole, co
     json["labels"] = bytesText(mesh.labels);
   }
   if (error) {
-    constexpr double kMost = 0.3;  // m; beyond it all is wrong alike
+    constexpr double kMost = 0.3;  // m; larger errors are not distinguished
     constexpr double kTop = 255;
     std::vector<std::uint8_t> errors;
     for (const Eigen::Vector3f& p : mesh.vertices) {

@@ -20,7 +20,7 @@ McapSink::McapSink(const std::string& file, const Calibration& calibration)
   for (std::size_t c = 0; c < cameras(); ++c) {
     info_[c] = cameraInfoOf(calibration.rig.camera[c]);
     if (!calibration.bare) continue;
-    // ROS's sign of a camera that is not calibrated: nothing but its size.
+    // In ROS, CameraInfo with nothing but a size means an uncalibrated camera.
     info_[c].distortion_model.clear();
     info_[c].d.clear();
     info_[c].k = {};

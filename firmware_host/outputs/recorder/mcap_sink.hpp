@@ -1,9 +1,9 @@
 #pragma once
-// A live recording as one MCAP file of ROS 2's messages: /imu0, /cam0/image_raw, /cam0/camera_info, ... as
-// `swiftlet export` gives them of a log (docs/export.md), images as pixels.
+// A live recording as one MCAP file with ROS 2 messages: /imu0, /cam0/image_raw, /cam0/camera_info, ... as
+// written by `swiftlet export` (docs/export.md), images uncompressed.
 //
-// One writer for all. The file has its name from the beginning: what a power cut leaves is whole up to the
-// last chunk of 1 MiB, and is read so.
+// One writer for all. The file has its final name from the beginning: after a power cut it is readable up to
+// the last complete chunk of 1 MiB.
 
 #include <array>
 #include <string>
@@ -15,7 +15,7 @@ namespace swiftlet {
 
 class McapSink final : public RecordSink {
  public:
-  /// InputError if the file is there already or cannot be written.
+  /// InputError if the file exists or cannot be written.
   McapSink(const std::string& file, const Calibration& calibration);
   ~McapSink() override { stopWriters(); }
 

@@ -10,7 +10,7 @@
 namespace swiftlet {
 namespace {
 
-/// The writers look this often: their rings hold a second and more.
+/// Period at which writers look for messages; the rings hold a second and more.
 constexpr Duration kPeriod = Duration::fromMilliseconds(5);
 
 }  // namespace
@@ -25,7 +25,7 @@ RecordSink::RecordSink(std::string out, const Calibration& calibration)
 void RecordSink::reserve(Camera& camera, const CameraModel& model) {
   camera.width = model.width();
   camera.height = model.height();
-  // Each slot once around, so that none grows later.
+  // Resizes every slot once, so that none grows later.
   for (std::size_t i = 0; i < kImagesAhead; ++i) {
     camera.images.beginPush()->pixels.resize(static_cast<std::size_t>(model.width()) *
                                              static_cast<std::size_t>(model.height()));

@@ -1,8 +1,8 @@
 #pragma once
-// What every live recording has in common: the devices' threads leave messages in fixed memory, writers of
-// low priority take them from there. What finds no room is counted, never waited for.
+// Base of live recordings: devices' threads put messages into fixed memory, low-priority writers take them
+// from there. Messages without room are counted; nobody waits.
 //
-// Memory: kImagesAhead images a camera, kSamplesAhead samples.
+// Memory: kImagesAhead images per camera, kSamplesAhead samples.
 
 #include <array>
 #include <atomic>
@@ -27,17 +27,17 @@ class RecordSink : public SensorSink {
     std::array<std::uint64_t, kMaxCameras> images_lost{};
   };
 
-  /// `out`: what is written, for messages.
+  /// `out`: name of the recording in messages.
   RecordSink(std::string out, const Calibration& calibration);
 
   void takeImu(const ImuSample& sample, Stamp arrival, const HostTimes& host) override;
   void takeScene(const SceneImages& /*scene*/) override {}
   void takeImage(const CameraFrame& image, const HostTimes& host) override;
 
-  /// After the devices' threads have ended: writes what waits. What could not be written is thrown.
+  /// After the devices' threads have ended: writes what is queued. Throws if something could not be written.
   void finish();
   [[nodiscard]] Counters counters() const;
-  /// Any thread: a writer has ended, a full disk for one; nothing more will be kept.
+  /// Any thread: whether a writer has ended, for example because the disk is full; nothing more is kept then.
   [[nodiscard]] bool failed() const { return failed_.load(std::memory_order_relaxed); }
 
  protected:
@@ -46,21 +46,21 @@ class RecordSink : public SensorSink {
     std::vector<std::uint8_t> pixels;
   };
 
-  /// A thread that calls `step` until it has nothing more to do after the end; step: false if nothing
-  /// waited.
+  /// Starts a thread that calls `step` until nothing is left after the end. `step` returns false if nothing
+  /// was queued.
   void startWriter(std::function<bool()> step);
-  /// Of a destructor: the writers use members of the class that is about to go.
+  /// Call in the destructor of the derived class, whose members the writers use.
   void stopWriters();
-  /// Called by finish() once all writers have ended well.
+  /// Called by finish() after all writers have ended without error.
   virtual void close() {}
 
   [[nodiscard]] std::size_t cameras() const { return cameras_; }
   [[nodiscard]] int width(std::size_t camera) const { return camera_[camera].width; }
   [[nodiscard]] int height(std::size_t camera) const { return camera_[camera].height; }
-  /// The oldest that waits; null: none. One writer a camera.
+  /// The oldest queued image; null: none. One writer per camera.
   [[nodiscard]] const Image* waitingImage(std::size_t camera) { return camera_[camera].images.front(); }
   void dropImage(std::size_t camera) { camera_[camera].images.pop(); }
-  /// The sensor's own reading: not corrected, in its own axes.
+  /// Reads the next sample as the sensor measured it: uncorrected, in its own axes. False: none.
   [[nodiscard]] bool nextSample(ImuSample& sample) {
     if (!samples_.tryPop(sample)) return false;
     if (!to_readings_.isIdentity()) to_readings_.apply(sample);
@@ -68,9 +68,9 @@ class RecordSink : public SensorSink {
   }
 
  private:
-  /// Two seconds at 30 Hz: the longest that an SD card's write took while others went on.
+  /// Two seconds at 30 Hz: the longest observed write of an SD card while other writes continued.
   static constexpr std::size_t kImagesAhead = 64;
-  static constexpr std::size_t kSamplesAhead = 4096;  // as long, at 2 kHz
+  static constexpr std::size_t kSamplesAhead = 4096;  // two seconds at 2 kHz
 
   struct Camera {
     int width = 0;

@@ -20,10 +20,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kSurfacePeriod = 2;      // s: as large as a map is, nobody looks more often
-constexpr double kDiagnosticsPeriod = 1;  // s; a change of health goes out at once
-/// Most between two looks at labels and at images to be labelled [s]: of 1600 images a second none is
-/// overrun by others.
+constexpr double kSurfacePeriod = 2;      // s; maps are large and are rarely viewed more often
+constexpr double kDiagnosticsPeriod = 1;  // s; changes of health are published at once
+/// Longest interval between checks for labels and for images to be labelled [s]: at up to 1600 images a
+/// second none is overwritten.
 constexpr double kLabelPeriod = kKeptImages / 1600.0;
 constexpr float kFullColour = 255;
 constexpr const char* kCameraFrame = "cam0";
@@ -44,7 +44,7 @@ DdsObstacle::Point obstaclePoint(const ObstacleNews& news) {
   point.distance = static_cast<float>(nearest.distance);
   point.known_to = static_cast<float>(nearest.known_to);
   if (nearest.stale) point.age = static_cast<float>((news.stamp - nearest.up_to).seconds());
-  // Zero where nothing is known, and between two surfaces that are as near.
+  // Zero if nothing is known, and at equal distance from two surfaces.
   if (!nearest.gradient.isZero()) {
     const Eigen::Vector3d normal_body = news.T_map_body.rotation.conjugate() * nearest.gradient;
     point.p = (-nearest.distance * normal_body).cast<float>();
@@ -82,8 +82,8 @@ class DdsThread::Work final : public Follower::Work {
     settings.complain = [](std::string_view line) { warn("dds: " + std::string(line)); };
     if (options.labels != nullptr) settings.label_topic = options.settings.label_topic;
     if (!link_.open(settings)) {
-      // A network interface may come up later: a service that ends by this is started again, one that ends by
-      // an InputError is not.
+      // A network interface may come up later: a service that ends with this exception is restarted, one that
+      // ends with an InputError is not.
       throw std::runtime_error("settings: ros2.interface, ros2.domain: " + link_.error() +
                                ". Or disable it with ros2.enabled: false");
     }
@@ -112,7 +112,7 @@ class DdsThread::Work final : public Follower::Work {
   }
 
  private:
-  /// Lets through once a period.
+  /// Limits the rate to once per period.
   struct Pace {
     double period;
     double next = 0;
@@ -147,7 +147,7 @@ class DdsThread::Work final : public Follower::Work {
     if (number == state_) return;
     state_ = number;
     const NavState state = outlet_.state.value().state();
-    if (state.health == Health::kFailed) return;  // no pose to be had by it
+    if (state.health == Health::kFailed) return;  // there is no valid pose
     DdsOdometry odometry;
     odometry.stamp = ros(state.stamp);
     odometry.frame = frames_.odom;
@@ -167,7 +167,7 @@ class DdsThread::Work final : public Follower::Work {
     link_.publish(transforms);
   }
 
-  /// At once when something changes and each second, whether or not frames come.
+  /// Publishes at once when something changes, and every second even if no frames arrive.
   void publishDiagnostics(double now) {
     const Stamp host = monotonicNow();
     const bool judged = outlet_.verdict.refresh() > 0;
@@ -213,7 +213,7 @@ class DdsThread::Work final : public Follower::Work {
     link_.publish(ros(stamp), {&status, 1});
   }
 
-  /// On the run's clock: the newest frame's stamp, carried on by the host's while none comes.
+  /// Current time on the run's clock: the newest frame's stamp, extrapolated by the host's clock.
   Stamp stampOfNow(Stamp host) {
     if (outlet_.frame.sequence() == 0) return host;
     if (outlet_.frame.sequence() != frame_) {
@@ -301,7 +301,7 @@ class DdsThread::Work final : public Follower::Work {
   Pace mesh_pace_;
   Pace surface_pace_{kSurfacePeriod};
   Pace diagnostics_pace_{kDiagnosticsPeriod};
-  /// What diagnostics told last.
+  /// State of the last published diagnostics.
   struct Told {
     Health health = Health::kInitializing;
     bool stale = false;
@@ -309,7 +309,7 @@ class DdsThread::Work final : public Follower::Work {
     bool operator==(const Told&) const = default;
   };
   std::optional<Told> told_;
-  std::uint64_t frame_ = 0;  ///< the newest that diagnostics saw
+  std::uint64_t frame_ = 0;  ///< number of the newest frame seen by diagnostics
   Stamp frame_came_;
   std::uint64_t state_ = 0, mesh_ = 0, surface_ = 0, obstacle_ = 0;           ///< numbers taken
   std::uint64_t odometries_ = 0, meshes_ = 0, surfaces_ = 0, obstacles_ = 0;  ///< published

@@ -15,16 +15,17 @@ namespace swiftlet {
 
 struct DdsThreadOptions {
   Ros2Group settings;
-  /// Read at every turn: live stamps are of CLOCK_MONOTONIC, ROS's of CLOCK_REALTIME. Null: stamps go out as
-  /// they are.
+  /// Read at every turn: live stamps are of CLOCK_MONOTONIC, ROS uses CLOCK_REALTIME. Unset: stamps are
+  /// published unchanged.
   std::function<HostClocks()> clocks;
-  double gyro_sigma = 0;            ///< rad/s, of one sample: of the angular velocity that goes out
-  LabelExchange* labels = nullptr;  ///< shown and filled; null: no labels are taken; outlives the thread
+  double gyro_sigma = 0;            ///< rad/s, of one sample; for the published angular velocity
+  LabelExchange* labels = nullptr;  ///< images out, labels in; null: no labels; outlives the thread
 };
 
 class DdsThread : public Follower {
  public:
-  /// Opens and begins. std::runtime_error naming the setting where DDS does not open. `outlet` outlives it.
+  /// Opens DDS and starts the thread. std::runtime_error naming the setting if DDS does not open. `outlet`
+  /// outlives this object.
   DdsThread(LiveOutlet& outlet, const DdsThreadOptions& options);
 
  private:

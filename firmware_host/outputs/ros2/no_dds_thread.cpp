@@ -1,4 +1,4 @@
-// Stands in for dds_thread.cpp in builds without Cyclone DDS.
+// Replaces dds_thread.cpp in builds without Cyclone DDS.
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/ros2/dds_thread.hpp"

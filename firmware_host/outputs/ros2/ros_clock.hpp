@@ -12,21 +12,21 @@ namespace swiftlet {
 
 class RosClock {
  public:
-  /// Takes the newest reading of the clocks. Without any, stamps go out as they are.
+  /// Takes the newest reading of the clocks. Without one, stamps are published unchanged.
   void follow(const HostClocks& now);
 
   [[nodiscard]] Stamp toRos(Stamp stamp) const { return stamp + offset(); }
-  /// Of something that will be answered under its stamp: toRos, remembered.
+  /// Like toRos(), and remembers the stamp, for messages that will be answered under it.
   Stamp toRosAndBack(Stamp stamp);
   /// The run's stamp of a published stamp, unaffected by later clock steps; other stamps use the current
   /// offset.
   [[nodiscard]] Stamp fromRos(Stamp ros) const;
 
-  /// Of the wall clock, as far as they are larger than the readings' errors.
+  /// Number of steps of the wall clock that exceeded the reading errors.
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
 
  private:
-  /// More than can wait for their answers: twice LabelExchange's places.
+  /// More than can wait for answers: twice the number of LabelExchange's places.
   static constexpr std::size_t kRemembered = 16;
   struct Sent {
     Stamp ros, own;

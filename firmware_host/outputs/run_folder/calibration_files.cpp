@@ -14,7 +14,7 @@ namespace {
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr double kToMs = 1e3;
 
-/// What of a camera was estimated, and how well.
+/// Describes what was estimated of a camera, and how well.
 std::string originText(const CalibrationEstimate& estimate, std::size_t camera) {
   std::string text = "estimated in flight;";
   if (estimate.rotation_sigma[camera] > 0) {
@@ -32,7 +32,7 @@ std::string originText(const CalibrationEstimate& estimate, std::size_t camera) 
 }
 
 void writeSensor(const std::filesystem::path& folder, const std::string& text) {
-  std::error_code error;  // the file's own says it
+  std::error_code error;  // ignored: the file itself reports the error
   std::filesystem::create_directories(folder, error);
   writeWholeFile((folder / "sensor.yaml").string(), text);
 }
@@ -87,12 +87,12 @@ std::string kalibrImu(const Calibration& given) {
 void writeEstimatedCalibration(const std::string& folder, const Calibration& given,
                                const CalibrationEstimate& estimate, double rate_hz) {
   const std::filesystem::path root(folder);
-  // The file's body again: the truth of a log may be given in it.
+  // Written in the file's original body frame, in which a log's truth may be given.
   const SE3 T_filebody_body = given.T_body_filebody.inverse();
   const std::string times = shiftYaml(estimate.camera_to_imu_shift) + shutterYaml(estimate.readout);
   for (std::size_t c = 0; c < given.rig.camera_count; ++c) {
     const double rate = given.camera_rate_hz[c] > 0 ? given.camera_rate_hz[c] : rate_hz;
-    // A camera that was left out stays as given.
+    // A camera that was not estimated keeps its given extrinsics.
     const SE3& T_body_cam = estimate.rotation_sigma[c] > 0 ? estimate.T_body_cam[c] : given.rig.T_body_cam[c];
     writeSensor(root / fmt::format("cam{}", c), cameraYaml(given.rig.camera[c], T_filebody_body * T_body_cam,
                                                            rate, originText(estimate, c), times));

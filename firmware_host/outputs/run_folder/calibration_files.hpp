@@ -1,6 +1,6 @@
 #pragma once
-// Calibrations as files that the next run reads, for `--calibration` and vehicle.calibration:
-// cam0/sensor.yaml, cam1/sensor.yaml and imu0/sensor.yaml (EuRoC).
+// Writes calibrations as files for later runs (`--calibration` and vehicle.calibration): cam0/sensor.yaml,
+// cam1/sensor.yaml and imu0/sensor.yaml (EuRoC).
 
 #include <string>
 

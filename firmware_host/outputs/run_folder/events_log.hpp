@@ -9,17 +9,17 @@
 
 namespace swiftlet {
 
-/// The name of what is a remark of the executor, in words, and no event of the estimator.
+/// Name of lines that are remarks of the executor and not events of the estimator.
 inline constexpr std::string_view kRemarkName = "remark";
 
 struct EventLine {
   Stamp stamp;
-  std::string name;  ///< as eventName() has it, or "remark"
+  std::string name;  ///< from eventName(), or "remark"
   std::string text;  ///< the rest of the line
 };
 
-/// In the file's order. InputError when the file cannot be read, and on a line without stamp or name: where
-/// `skipped` is given such lines are left out and counted in it instead.
+/// In the file's order. InputError if the file cannot be read, and for a line without stamp or name; if
+/// `skipped` is given, such lines are omitted and counted there instead.
 std::vector<EventLine> readEvents(const std::string& path, std::size_t* skipped = nullptr);
 
 }  // namespace swiftlet

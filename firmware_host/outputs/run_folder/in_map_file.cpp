@@ -5,7 +5,7 @@
 namespace swiftlet {
 namespace {
 
-// Half a minute of a fast camera: loop closure that is further behind has lost keyframes long before.
+// Half a minute of a fast camera: if loop closure is further behind, it has lost keyframes long before.
 constexpr std::size_t kMostWaiting = 4096;
 
 }  // namespace

@@ -1,10 +1,11 @@
 #pragma once
-// in_map.tum: the pose of each image in the frame of a kept map, as long as the flight is located there.
+// in_map.tum: the pose of each image in the frame of a kept map, while the flight is located in it.
 //
-// An image's pose is the odometry's at its time, moved by what loop closure knew at the newest keyframe up to
-// it, so that a line never knows of later images. Images and reports come through different queues, so either
-// may come first: images wait for the report on a later keyframe, reports for the images before them. Which
-// keyframe has a report is recorded with the flight, so that a repetition writes the same lines.
+// The pose is the odometry's at the image's time, corrected by what loop closure knew at the newest keyframe
+// up to the image, so that a line never depends on later images. Images and reports come through different
+// queues, so either may come first: images wait for the report on a later keyframe, reports for the images
+// before them. The keyframes with a report are recorded with the flight, so that a repetition writes the same
+// lines.
 
 #include <deque>
 #include <string>
@@ -21,7 +22,7 @@ class InMapFile {
 
   void addFrame(std::uint64_t frame, Stamp stamp, const NavState& state);
   void addReport(const LoopReport& report);
-  /// No more reports come.
+  /// Call when no more reports will come.
   void finish();
 
  private:
@@ -36,7 +37,7 @@ class InMapFile {
     MapCorrection correction;
   };
   void takeReport();
-  /// The images whose newest report is known; all that wait if no more reports come.
+  /// Writes the images whose newest report is known; if `ended`, all.
   void write(bool ended);
 
   LineFile file_;

@@ -1,7 +1,8 @@
 #pragma once
 // loops.csv of a run folder: one row per geometrically verified loop, in the order of detection, with the
-// final verdict of the selection. Stamps [ns] of the keyframes' images; T_old_new between the bodies,
-// quaternion xyzw; 1 sigma of the worst direction of rotation [rad] and translation [m].
+// final verdict of the selection. Stamps [ns] are those of the keyframes' images; T_old_new is between the
+// bodies, quaternion xyzw; standard deviations are of the worst direction of rotation [rad] and translation
+// [m].
 
 #include <span>
 #include <string>
@@ -17,7 +18,7 @@ std::string_view verdictName(LoopVerdict verdict);
 /// Replaces the file.
 void writeLoops(const std::string& path, std::span<const MapLoop> loops);
 
-/// InputError names file and line.
+/// InputError naming file and line.
 std::vector<MapLoop> readLoops(const std::string& path);
 
 }  // namespace swiftlet

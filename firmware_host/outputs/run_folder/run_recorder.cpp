@@ -17,7 +17,7 @@
 namespace swiftlet {
 namespace {
 
-/// The event's value in words where it is a code, as a number otherwise.
+/// The event's value: the name of a code, otherwise a number.
 std::string valueText(const Event& event) {
   if (event.kind == EventKind::kHealthChanged) {
     return std::string(healthName(static_cast<Health>(static_cast<int>(event.value))));
@@ -80,7 +80,7 @@ void RunRecorder::writeTo(std::optional<File>& file, const Write& write) {
 void RunRecorder::onFrame(const TrackedFrame& tracked, const OdometryOutput& output) {
   writeEvents(output);
   writeKeyframes(output);
-  // One line per image at the image's own stamp; the state's is the same instant on the IMU's clock.
+  // One line per image with the image's own stamp; the state's stamp is the same instant on the IMU's clock.
   if (!output.has_state) return;
   writeTo(odometry_,
           [&](LineFile& file) { file.write(formatTum(tracked.stamp, output.state.T_world_body)); });

@@ -1,9 +1,8 @@
 #pragma once
 // Writes the files of a run folder that grow during the run: odometry.tum; on request imu_rate.tum with
-// imu_rate_health.csv (a line when health or epoch of those states changes) and meshes/; states.csv,
-// events.log; and local_mesh.ply, map.ply and map.glb at the end. Lines are written as they arrive, in
-// constant memory. A file that can no longer be written ends there and is reported once by name; the others
-// continue.
+// imu_rate_health.csv (a line for each change of health or epoch of those states) and meshes/; states.csv and
+// events.log. At the end: local_mesh.ply, map.ply and map.glb. Lines are written as they arrive, in constant
+// memory. A file that can no longer be written ends there and is reported once by name; the others continue.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -26,10 +25,11 @@ class RunRecorder : public RunListener {
     bool meshes = false;
     bool in_map = false;        ///< in_map.tum
     std::string keep_map = "";  ///< folder of the map to keep; empty: none
-    /// Go on without a file that cannot be made, too; else InputError.
+    /// Also continue without a file that cannot be created; otherwise InputError.
     bool fly_on = false;
   };
-  /// The folder is there already; empty: write nothing. `lost` outlives this and gets what cannot be written.
+  /// The folder must exist; empty: nothing is written. `lost` outlives this object and receives what cannot
+  /// be written.
   RunRecorder(const std::string& folder, const Wanted& wanted, LostFiles& lost);
 
   void onFrame(const TrackedFrame& tracked, const OdometryOutput& output) override;
@@ -42,11 +42,11 @@ class RunRecorder : public RunListener {
   void onMap(MapStage& map, std::span<const std::uint32_t> tied) override;
   void onFinish(const OdometryOutput& output) override;
   void onRemark(Stamp stamp, const std::string& text) override;
-  /// For the graph: where surface goes that the map has no room for.
+  /// For the graph: storage of map blocks that do not fit in memory.
   [[nodiscard]] BlockFile& storage() { return storage_; }
-  /// The map that is kept gets its name.
+  /// Makes the kept map appear under its name.
   void commitMap();
-  /// Of the map and its surface; null without one.
+  /// Summary of the map and its surface; null without a map.
   [[nodiscard]] const nlohmann::ordered_json& map() const { return map_; }
 
  private:
@@ -65,8 +65,8 @@ class RunRecorder : public RunListener {
   std::optional<LineFile> odometry_;
   std::optional<LineFile> imu_rate_;
   std::optional<LineFile> imu_rate_health_;
-  std::optional<Health> health_;  ///< the newest of imu_rate_health_
-  std::uint32_t epoch_ = 0;       ///< likewise
+  std::optional<Health> health_;  ///< of the newest line in imu_rate_health_
+  std::uint32_t epoch_ = 0;       ///< of the newest line in imu_rate_health_
   std::optional<LineFile> states_;
   std::optional<LineFile> events_;
   std::optional<InMapFile> in_map_;

@@ -14,12 +14,12 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kUnit = 1e-6;  // of a quaternion's norm, from 17 digits
+constexpr double kUnit = 1e-6;  // tolerance of a quaternion's norm, written with 17 digits
 constexpr std::size_t kFirstVariance = 17;
 constexpr std::size_t kFirstCovariance = kFirstVariance + kStateDim;
 constexpr std::size_t kCovariances = kPoseDim * (kPoseDim - 1) / 2;
 constexpr std::size_t kNumbers = kFirstCovariance + kCovariances;
-constexpr std::size_t kFigures = 11;  // health and what follows it
+constexpr std::size_t kFigures = 11;  // health and the columns after it
 
 void append(std::string& row, double value) { row += fmt::format(",{:.17g}", value); }
 
@@ -27,7 +27,7 @@ void append(std::string& row, const Eigen::Vector3d& v) {
   for (const double x : v) append(row, x);
 }
 
-/// The row up to the covariances, and its quaternion's norm; false: rejected.
+/// Reads the row up to the covariances, and its quaternion's norm. False: rejected.
 bool readState(CsvReader& csv, NavState& state, double& norm) {
   std::array<const char*, kNumbers - 1> names{};
   names.fill("state or covariance");
@@ -58,8 +58,8 @@ constexpr std::array<const char*, kFigures> kFigureNames = {
     "health",         "epoch",        "at_rest",          "tracks",       "landmarks", "inliers_mono",
     "inliers_stereo", "track_length", "reprojection_rms", "imu_residual", "iterations"};
 
-/// What stands behind the covariances, in the order of statesRow(). Gives the first of kFigureNames that is
-/// wrong, or their number.
+/// Reads the columns after the covariances, in the order of statesRow(). Returns the index of the first wrong
+/// one in kFigureNames, or their number.
 std::size_t readFigures(const CsvReader& csv, KeyframeState& keyframe) {
   const std::optional<Health> health = healthNamed(csv.field(kNumbers));
   if (!health) return 0;

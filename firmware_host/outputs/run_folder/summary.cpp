@@ -93,9 +93,9 @@ Json countersJson(const RunFacts& facts, const RunStatistics& statistics) {
   return json;
 }
 
-/// One line of text, not a line a number: "from_ms count" of each column that holds something.
+/// The histogram as one line instead of one line per number: "from_ms count" of each non-empty column.
 std::string histogramText(const LatencyHistogram& histogram) {
-  constexpr double kFirstEdge = 1e-6;  // s; what is shorter counts in the first column
+  constexpr double kFirstEdge = 1e-6;  // s; shorter durations count in the first column
   constexpr int kDecades = 8;
   std::string text;
   std::uint64_t below = 0;
@@ -297,7 +297,7 @@ std::string summaryText(const Json& summary) {
 }
 
 void writeJson(const std::string& path, const Json& json) {
-  // File names in messages may hold any bytes.
+  // File names in messages may contain any bytes, so invalid UTF-8 is replaced.
   writeWholeFile(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

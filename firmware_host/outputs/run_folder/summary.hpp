@@ -1,8 +1,8 @@
 #pragma once
-// summary.json of a run: versions, input, settings, health history, counters, latency per stage, CPU
-// time, memory and, when the log has truth, accuracy.
+// summary.json of a run: versions, input, settings, health history, counters, latency per stage, CPU time,
+// memory and, if the log has truth, accuracy.
 //
-// Everything but "timing", "cpu" and "memory" is a function of log, settings and program: two runs give
+// Everything except "timing", "cpu" and "memory" is a function of log, settings and program: two runs give
 // the same bytes there.
 
 #include <nlohmann/json.hpp>
@@ -16,8 +16,8 @@
 
 namespace swiftlet {
 
-/// Of "histogram" in the timing of a stage: "from_ms count, from_ms count" of the columns that hold
-/// something, from the shortest on.
+/// Resolution of "histogram" in a stage's timing: "from_ms count, from_ms count" for the non-empty columns,
+/// shortest first.
 inline constexpr int kHistogramColumnsPerDecade = 20;
 
 struct MemoryRow {
@@ -26,35 +26,36 @@ struct MemoryRow {
 };
 
 struct RunFacts {
-  std::string log;                    ///< empty: flown on devices
+  std::string log;                    ///< empty: the run used devices
   std::string tracks;                 ///< file of feature tracks; empty when images were used
-  std::uint64_t track_surplus = 0;    ///< landmarks beyond kMaxFeatures in a frame, left out
-  std::vector<std::string> warnings;  ///< lines for the user, of the input
+  std::uint64_t track_surplus = 0;    ///< landmarks omitted because a frame had more than kMaxFeatures
+  std::vector<std::string> warnings;  ///< warnings about the input, as lines for the user
   std::string calibration_form;
-  /// What the input counted, by its name in the summary's counters: {"log": {...}}.
+  /// The input's counters, by name: {"log": {...}}.
   nlohmann::ordered_json input = nlohmann::ordered_json::object();
   bool mono = false;
   bool finished = true;  ///< false: stopped by the user
-  double wall = 0;       ///< s of the run, reading included
+  double wall = 0;       ///< s, duration of the run including reading
   double cpu = 0;        ///< s, all threads
   std::int64_t peak_resident = 0;
   std::vector<MemoryRow> memory;
-  /// How the run was executed: its kind, and of a threaded one threads, rights, memory, arming, recording.
+  /// How the run was executed: its kind, and for a threaded run its threads, rights, memory, arming,
+  /// recording.
   nlohmann::ordered_json executor = nlohmann::ordered_json::object();
 };
 
-/// Without accuracy: the caller adds it under "accuracy".
+/// Without "accuracy", which the caller adds.
 nlohmann::ordered_json summaryOf(const RunFacts& facts, const Settings& settings,
                                  const RunStatistics& statistics);
 
-/// From the images' clock, which the poses of a run have, to that of the IMU and the truth: as estimated at
-/// the run's end, or as calibrated. Zero where a summary does not say.
+/// Shift from the images' clock, used by the run's poses, to the clock of IMU and truth: as estimated at the
+/// run's end, or as calibrated. Zero if the summary does not contain it.
 Duration cameraToImuShift(const nlohmann::ordered_json& summary);
 
 nlohmann::ordered_json toJson(const LogCounters& log);
-/// Of full smoothing, under "full_smoothing" in the counters.
+/// Report of full smoothing, for "full_smoothing" in the counters.
 nlohmann::ordered_json toJson(const FullSmootherReport& map);
-/// Latencies of the stages that did something, by their names.
+/// Latencies of the stages that did something, by stage name.
 nlohmann::ordered_json timingJson(const StageTable& table);
 
 /// Counters of the mesher, without those of the pipeline around it.

@@ -15,7 +15,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kLook = 0.1;  // s: how often a wait looks whether all ends
+constexpr double kLook = 0.1;  // s; how often a wait checks whether the server ends
 
 bool isHeader(std::string_view line, std::string_view name) {
   return line.size() > name.size() && line[name.size()] == ':' &&

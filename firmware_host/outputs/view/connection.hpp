@@ -1,8 +1,9 @@
 #pragma once
-// A connection as the web server reads and writes it: one small request that has to come soon, and writes
-// that end when the reader takes nothing, or the server ends.
+// A connection of the web server: one small request that must arrive soon, and writes that end if the reader
+// takes nothing or the server ends.
 //
-// Of a request only the first line, Host and Origin are handed on: what else a client sends is nobody's work.
+// Only the request's first line, Host and Origin are passed on; everything else that a client sends is
+// ignored.
 
 #include <atomic>
 #include <cstddef>
@@ -12,28 +13,28 @@ namespace swiftlet {
 
 class Connection {
  public:
-  static constexpr std::size_t kMostLine = 1024;  ///< bytes of one line that is handed on
+  static constexpr std::size_t kMostLine = 1024;  ///< bytes of one line that is passed on
   static constexpr std::size_t kMostRequest =
       16384;                                     ///< bytes: browsers send cookies of other pages of the host
   static constexpr double kRequestPatience = 3;  ///< s
 
-  /// `socket` stays open for as long as this lives. `deadline`: host's time after which nothing waits any
-  /// more; another thread lowers it to end all.
+  /// `socket` stays open as long as this object. `deadline`: host time after which nothing waits any longer;
+  /// another thread lowers it to end everything.
   Connection(int socket, const std::atomic<double>& deadline, double patience);
 
-  /// Reads the request's head. False: none came in time, or it is too long or no request.
+  /// Reads the request's head. False: none arrived in time, it is too long, or it is not a request.
   bool readHead();
 
-  /// A write gave up on a reader that took nothing, before the end of all.
+  /// Whether a write gave up on a reader that took nothing, before the server's end.
   [[nodiscard]] bool gaveUp() const { return gave_up_; }
 
-  /// A write failed: nothing more can be sent.
+  /// Whether a write failed; nothing more can be sent.
   [[nodiscard]] bool failed() const { return failed_; }
-  /// What readHead() has read; a read takes from it.
+  /// Bytes of the head from readHead() that read() has not returned yet.
   [[nodiscard]] std::size_t unread() const { return head_.size() - read_; }
   std::size_t read(char* to, std::size_t size);
-  /// Waits for a reader who takes nothing, not longer than `patience`. Bytes taken; -1: nothing more can be
-  /// sent.
+  /// Waits at most `patience` for a reader that takes nothing. Returns the bytes sent; -1: nothing more can
+  /// be sent.
   std::ptrdiff_t write(const char* from, std::size_t size);
   [[nodiscard]] int socket() const { return socket_; }
 

@@ -1,8 +1,8 @@
 #pragma once
-// A page of one's own on the live view's server: a document of HTML, and a stream of JSON for it
-// (docs/view.md): each event is the whole state, so that a viewer who lost some needs nothing else.
+// An independent page on the live view's server: an HTML document and a stream of JSON events for it
+// (docs/view.md). Each event is the whole state, so a viewer that lost some needs nothing else.
 //
-// publish() from one thread; it waits for nobody. Memory and viewers as ViewHub's.
+// publish() from one thread; it does not wait. Memory and viewers as in ViewHub.
 
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -14,16 +14,16 @@ namespace swiftlet {
 
 class EventPage {
  public:
-  /// Listens from now on. InputError naming --view where the address cannot be had.
+  /// Starts listening. InputError naming --view if the address is not available.
   EventPage(const ViewAddress& address, std::string html);
   ~EventPage();
   EventPage(const EventPage&) = delete;
   EventPage& operator=(const EventPage&) = delete;
 
   [[nodiscard]] std::string url() const;
-  /// Whether somebody looks.
+  /// Whether there are viewers.
   [[nodiscard]] bool watched() const;
-  /// `text`: the same for GET /text.
+  /// `text`: the same state for GET /text.
   void publish(const nlohmann::ordered_json& state, const std::string& text);
 
  private:

@@ -39,7 +39,7 @@ enum State : std::size_t {
   kLargestSigma = kSigmaVelocity + 3,
   kStateColumns
 };
-/// And of the frames'.
+/// Columns of the frames' table.
 enum Frame : std::size_t {
   kTracks = 1,
   kMono,
@@ -52,7 +52,7 @@ enum Frame : std::size_t {
   kFrameColumns
 };
 
-/// And of the nearest obstacle's.
+/// Columns of the nearest obstacle's table.
 enum Obstacle : std::size_t { kToSurface = 1, kToUnknown, kObstacleColumns };
 
 std::string encoded(std::span<const float> values) { return base64Of(values); }
@@ -186,7 +186,7 @@ void LiveDocument::takeFrame(LiveOutlet& outlet) {
 
 void LiveDocument::takeState(LiveOutlet& outlet, double now) {
   const std::uint64_t number = outlet.state.refresh();
-  // Before there is a pose there is no state either.
+  // No states are taken before the first pose.
   if (number == state_number_ || !frame_ || (!state_ && !frame_->has_state)) return;
   const NavState state = outlet.state.value().state();
   const double t = seconds(state.stamp);
@@ -217,7 +217,7 @@ void LiveDocument::takeState(LiveOutlet& outlet, double now) {
   put(kSigmaAttitude, sigma(0) * kToDegrees);
   put(kSigmaVelocity, sigma(2));
   row[kLargestSigma] = static_cast<float>(sigma(1).maxCoeff());
-  // A failed state has no pose to be had by it.
+  // A failed state has no valid pose.
   if (state.health != Health::kFailed) states_.add(row);
   state_number_ = number;
   state_ = state;
@@ -300,7 +300,7 @@ void LiveDocument::takeSurface(LiveOutlet& outlet, double now) {
   surface_number_ = number;
   const SurfaceNews& surface = outlet.surface.value();
   if (surface.vertices.empty()) return;
-  // The map's axes are not the odometry's, where loop closure has moved the map.
+  // The map's axes differ from the odometry's once loop closure has moved the map.
   const MapCorrection& correction = outlet.correction.value();
   const bool moved = outlet.correction.sequence() > 0 && state_ && correction.epoch == state_->epoch;
   const SE3 T_world_map = moved ? correction.T_map_world.inverse() : SE3();

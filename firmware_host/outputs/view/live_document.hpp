@@ -1,10 +1,9 @@
 #pragma once
-// What the live view shows, as the report's document (docs/report.md) and the patches that make it grow
-// (docs/view.md): made of the newest values of a LiveOutlet.
+// Content of the live view, as the report's document (docs/report.md) and patches that extend it
+// (docs/view.md), made from the newest values of a LiveOutlet.
 //
-// sample() is asked to be called some twenty times a second, patch() a few times. document() stands for the
-// state after the last patch. One thread. Memory: bounded (LiveTable, and the bounds below), whatever the
-// run's length.
+// Call sample() some twenty times a second and patch() a few times. document() is the state after the last
+// patch. One thread. Memory: bounded (LiveTable, and the limits below), whatever the run's length.
 
 #include <cstdint>
 #include <deque>
@@ -22,26 +21,26 @@ namespace swiftlet {
 class LiveDocument {
  public:
   static constexpr std::size_t kMostEvents = 300;
-  static constexpr std::size_t kMostSpans = 100;          ///< of health
-  static constexpr std::size_t kMostCloudPoints = 40000;  ///< of the map's surface, of equal steps through it
+  static constexpr std::size_t kMostSpans = 100;          ///< spans of health
+  static constexpr std::size_t kMostCloudPoints = 40000;  ///< points of the map; more are thinned evenly
 
-  /// `cameras`: of the document's run (image_panel.js); empty: no images are shown.
+  /// `cameras`: for the document's run (image_panel.js); empty: no images are shown.
   explicit LiveDocument(std::string name, nlohmann::ordered_json cameras = nlohmann::ordered_json::array());
 
-  /// Takes what is new. `now`: the host's clock [s]. `watched`: somebody looks, so that surfaces are worth
-  /// their work.
+  /// Takes new values. `now`: the host's clock [s]. `watched`: there are viewers, so that surfaces are worth
+  /// computing.
   void sample(LiveOutlet& outlet, double now, bool watched);
-  /// What came since the last patch; counts them from 1.
+  /// Changes since the last patch; patches are numbered from 1.
   nlohmann::ordered_json patch();
   [[nodiscard]] nlohmann::ordered_json document() const;
-  /// The newest figures in lines of text.
+  /// The newest figures as lines of text.
   [[nodiscard]] std::string text() const;
-  /// On the page's time axis [s]; before the first frame its origin.
+  /// Time on the page's axis [s]. Before the first frame, sets the origin.
   [[nodiscard]] double timeOf(Stamp stamp) {
     begin(stamp);
     return seconds(stamp);
   }
-  /// Whose summary tells how the view itself fares.
+  /// Counters of the view itself, for the summary shown.
   void setViewers(const nlohmann::ordered_json& counters) { viewers_ = counters; }
 
  private:
@@ -57,7 +56,7 @@ class LiveDocument {
     const char* y_label;
     const LiveTable* table;
     std::vector<Line> lines;
-    /// Of a plan: column of x; the time's otherwise.
+    /// For a plan view: column of x; otherwise the time's.
     std::size_t x = 0;
   };
 
@@ -102,7 +101,7 @@ class LiveDocument {
   std::optional<Verdict> verdict_;
   bool supervised_ = true;  ///< the verdict is not stale
   std::string waiting_for_;
-  Json mesh_, cloud_;  ///< null: none yet
+  Json mesh_, cloud_;  ///< null: none so far
   bool mesh_changed_ = false, cloud_changed_ = false;
   Json viewers_;
   int patches_to_tables_ = 0;

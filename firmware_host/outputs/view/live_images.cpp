@@ -13,9 +13,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kRateSpan = 1;  // s over which a camera's rate is counted
+constexpr double kRateSpan = 1;  // s, over which a camera's rate is counted
 
-// Tenths of a pixel are enough to look at.
+// A tenth of a pixel is enough for display.
 double shown(double pixel) { return std::round(10 * pixel) / 10; }
 
 void addPixel(Json& json, const Eigen::Vector2f& pixel) {
@@ -66,7 +66,7 @@ void LiveImages::receive(ImageFeed& feed) {
         camera.counted_stamp = frame.stamp;
       }
       camera.held.push_back(std::move(loan));
-      // Two slots stay free for what comes next.
+      // Two slots stay free for the next images.
       if (camera.held.size() > kViewQuota - 2) camera.held.pop_front();
     }
   }
@@ -155,7 +155,7 @@ void LiveImages::addSight(const LiveOutlet& outlet, std::size_t c, Json& json) c
     rejected.push_back(static_cast<int>(lost.loss));
   }
   if (c != 0) return;
-  // Of camera 0, as both are made.
+  // Only camera 0 has mesh and loops.
   const LocalMesh& mesh = outlet.mesh.value();
   if (outlet.mesh.sequence() > 0 && sight.has_pose && mesh.epoch == sight.epoch) {
     json["mesh"] = meshJson(mesh, sight.T_world_cam[0]);
@@ -177,7 +177,7 @@ Json LiveImages::meshJson(const LocalMesh& mesh, const SE3& T_world_cam) const {
   const SE3 T_cam_world = T_world_cam.inverse();
   const CameraModel& lens = rig_.camera[0];
   Json vertices = Json::array();
-  std::vector<int> index(mesh.vertices.size(), -1);  // in the message; -1: not in the image
+  std::vector<int> index(mesh.vertices.size(), -1);  // index in the message; -1: not in the image
   std::vector<Eigen::Vector2d> pixels(mesh.vertices.size());
   int count = 0;
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
@@ -192,7 +192,7 @@ Json LiveImages::meshJson(const LocalMesh& mesh, const SE3& T_world_cam) const {
     if (index[a] < 0 || index[b] < 0 || index[c] < 0) continue;
     const Eigen::Vector2d ab = pixels[b] - pixels[a];
     const Eigen::Vector2d ac = pixels[c] - pixels[a];
-    // Counter-clockwise from where it was seen; rows go down. Else it shows its back.
+    // Faces seen from the observed side are counter-clockwise; rows go down. Others show their back.
     if (ab.x() * ac.y() - ab.y() * ac.x() > 0) continue;
     edges.emplace_back(std::minmax(index[a], index[b]));
     edges.emplace_back(std::minmax(index[b], index[c]));

@@ -1,10 +1,10 @@
 #pragma once
-// The camera images of the live view, with what the estimator made of them as vectors (docs/view.md).
+// Camera images of the live view, with the estimator's results as vectors (docs/view.md).
 //
-// sample() takes what came; where a frame's tracks and its images are both there it becomes the instant to be
-// shown. Without tracks for kPatience (no IMU, say) images come alone. One thread. Memory: one picture a
-// camera; the images stay in the graph's slots, at most kViewQuota of each camera, and none while nobody
-// looks.
+// sample() takes new images; when the tracks and all images of a frame are available, that frame becomes the
+// instant to show. If no tracks arrive for kPatience (for example without an IMU), images are shown alone.
+// One thread. Memory: one picture per camera; the images stay in the graph's slots, at most kViewQuota of
+// each camera, and none without viewers.
 
 #include <array>
 #include <cstdint>
@@ -29,13 +29,14 @@ class LiveImages {
 
   /// [{"width", "height"}] of the cameras' images [px].
   [[nodiscard]] nlohmann::ordered_json cameras() const;
-  /// `now`: host's clock [s]. `watched`: somebody looks. True: there is an instant that was not shown.
+  /// `now`: host's clock [s]. `watched`: there are viewers. True: there is an instant that has not been
+  /// shown.
   [[nodiscard]] bool sample(LiveOutlet& outlet, double now, bool watched);
   /// Stamp of that instant.
   [[nodiscard]] Stamp stamp() const { return stamp_; }
-  /// It, and lets go of its images. `t`: its time on the page [s].
+  /// The message for that instant; releases its images. `t`: its time on the page [s].
   [[nodiscard]] nlohmann::ordered_json take(LiveOutlet& outlet, double t, const PictureSize& size);
-  /// The same without making anything of it.
+  /// Releases the instant without making a message.
   void skip();
 
  private:
@@ -49,8 +50,8 @@ class LiveImages {
   [[nodiscard]] Json meshJson(const LocalMesh& mesh, const SE3& T_world_cam) const;
 
   struct Camera {
-    std::deque<Loan> held;           ///< in order, until their tracks are there
-    Loan shown;                      ///< of the instant
+    std::deque<Loan> held;           ///< in order, until their tracks arrive
+    Loan shown;                      ///< image of the instant
     std::uint64_t counted_from = 0;  ///< number and stamp from which the rate is counted
     Stamp counted_stamp;
     double rate = 0;  ///< Hz; 0: unknown
@@ -60,9 +61,9 @@ class LiveImages {
   std::array<Camera, kMaxCameras> camera_;
   std::uint64_t sight_number_ = 0;
   bool has_sight_ = false;  ///< the instant is the feed's newest sight
-  bool fresh_ = false;      ///< an instant waits to be shown
+  bool fresh_ = false;      ///< an instant is waiting to be shown
   Stamp stamp_;
-  double waiting_ = -1;  ///< host's clock, since when images wait for tracks; negative: none do
+  double waiting_ = -1;  ///< host time since which images wait for tracks; negative: none wait
   PictureCoder coder_;
   std::vector<TrackId> landmarks_;  ///< of the window at the instant, sorted
 };

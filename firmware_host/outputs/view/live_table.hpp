@@ -1,11 +1,11 @@
 #pragma once
-// Figures over time in bounded memory: rows of 32-bit floats, the first column rising time.
+// Figures over time in bounded memory: rows of 32-bit floats; the first column is the rising time.
 //
-// When the table is full the rows are thinned: of each of at most kMost / 2 equal stretches of time one row
-// stays, the one with the highest value of the column `judge`, or where there is none the first. Stretches
-// become twice as long whenever there are too many, so that thinning again and again takes nothing from the
-// same place. Old figures become coarser the longer a run lasts, the newest keep their rate. Cost of add():
-// O(1); thinning: O(rows), once in at least kMost / 2 rows.
+// A full table is thinned: time is divided into at most kMost / 2 equal stretches, and one row of each is
+// kept, the one with the highest value in the column `judge`, or the first if there is no such column. The
+// stretches double whenever there are too many, so that repeated thinning removes nothing from the same
+// place. Old figures become coarser the longer a run lasts; the newest keep their rate. Cost of add(): O(1);
+// thinning: O(rows), at most once in kMost / 2 rows.
 
 #include <cstddef>
 #include <span>
@@ -20,7 +20,7 @@ class LiveTable {
 
   explicit LiveTable(std::size_t columns, std::size_t judge = kNoJudge);
 
-  /// `row` has as many values as there are columns; one whose time does not rise is left out.
+  /// `row` has one value per column. A row whose time does not rise is omitted.
   void add(std::span<const float> row);
 
   [[nodiscard]] std::size_t rows() const { return columns_.front().size(); }
@@ -28,9 +28,9 @@ class LiveTable {
     return std::span<const float>(columns_[index]).subspan(from);
   }
 
-  /// First row that came after the last sent(); 0 where all have to be sent anew.
+  /// First row added after the last sent(); 0 if all must be sent again.
   [[nodiscard]] std::size_t unsent() const { return unsent_; }
-  /// The rows were thinned since the last sent().
+  /// Whether the rows were thinned since the last sent().
   [[nodiscard]] bool replaced() const { return replaced_; }
   void sent();
 
@@ -39,7 +39,7 @@ class LiveTable {
 
   std::vector<std::vector<float>> columns_;
   std::size_t judge_;
-  double origin_ = 0;   ///< of the stretches: the first row's time
+  double origin_ = 0;   ///< start of the stretches: the first row's time
   double stretch_ = 0;  ///< 0: never thinned
   std::size_t unsent_ = 0;
   bool replaced_ = false;

@@ -8,7 +8,7 @@ namespace swiftlet {
 
 void yieldToOthers() {
   constexpr int kNice = 10;
-  // Of this thread alone, as Linux has it.
+  // On Linux this affects only the calling thread.
   static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kNice));
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// The threads that answer the live view's connections: few, low, on small stacks that are there from the
-// start.
+// The threads that answer the live view's connections: few, of low priority, with small stacks reserved at
+// the start.
 
 #include <array>
 #include <condition_variable>
@@ -13,15 +13,15 @@
 
 namespace swiftlet {
 
-/// Threads that only serve viewers give way to all others, also where no thread may have real-time priority:
-/// the calling thread gets a niceness of 10. Where that is refused it stays as it is.
+/// Gives the calling thread a niceness of 10: threads that only serve viewers give way to all others, even if
+/// no thread may have real-time priority. If refused, the thread stays as it is.
 void yieldToOthers();
 
-/// A connection more than there are threads and places to wait makes the accepting thread wait: further ones
-/// stay in the kernel's short queue.
+/// When all threads are busy and all waiting places are taken, the accepting thread waits; further
+/// connections stay in the kernel's short queue.
 class LowThreads {
  public:
-  /// Bytes of a stack: an answer takes some tens of kilobytes, sanitizers more than all else.
+  /// Stack size in bytes: an answer takes some tens of kilobytes; sanitizers take more than everything else.
   static std::size_t stackBytes();
   static constexpr std::size_t kMostWaiting = 8;
 
@@ -31,7 +31,7 @@ class LowThreads {
   LowThreads& operator=(const LowThreads&) = delete;
 
   void enqueue(std::function<void()> job);
-  /// Does what waits and joins.
+  /// Finishes queued jobs and joins.
   void shutdown();
 
  private:

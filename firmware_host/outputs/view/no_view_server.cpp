@@ -1,4 +1,4 @@
-// Stands in for view_server.cpp in builds without cpp-httplib.
+// Replaces view_server.cpp in builds without cpp-httplib.
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_server.hpp"

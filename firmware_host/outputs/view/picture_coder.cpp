@@ -19,14 +19,14 @@ class PictureCoder::Coder {
   Coder& operator=(const Coder&) = delete;
 
   tjhandle handle;
-  unsigned char* bytes = nullptr;  ///< the library's; grows as pictures need it
+  unsigned char* bytes = nullptr;  ///< owned by the library; grows with the pictures
   unsigned long size = 0;          // NOLINT(google-runtime-int): the library's type
 };
 
 PictureCoder::PictureCoder() : coder_(std::make_unique<Coder>()) {}
 PictureCoder::~PictureCoder() = default;
 
-/// The mean of each square of n x n pixels.
+/// Reduces the image by taking the mean of each square of n x n pixels.
 ImageView PictureCoder::reduced(const ImageView& image, int most_width) {
   const int n = (image.width + most_width - 1) / most_width;
   if (n <= 1) return image;

@@ -1,8 +1,8 @@
 #pragma once
-// Camera images as JPEG that a page takes: reduced by a whole number, grey.
+// Encodes camera images as JPEG for a page: grey, reduced by an integer factor.
 //
 // One thread. Memory: one reduced image and one picture. Cost: about 1.5 ms for 752 x 480 at full size, 0.5
-// ms at half of it.
+// ms at half size.
 
 #include <cstddef>
 #include <cstdint>
@@ -26,7 +26,7 @@ class PictureCoder {
   PictureCoder(const PictureCoder&) = delete;
   PictureCoder& operator=(const PictureCoder&) = delete;
 
-  /// "data:image/jpeg;base64,..."; empty where there is no image or the library refuses it.
+  /// "data:image/jpeg;base64,..."; empty if there is no image or the library refuses it.
   [[nodiscard]] std::string encode(const ImageView& image, const PictureSize& size);
 
  private:

@@ -30,10 +30,10 @@ bool isNumbers(const std::string& host) {
 
 struct HostAndPort {
   std::string host;
-  std::string port;  ///< without its colon; empty: none was given
+  std::string port;  ///< without the colon; empty: not given
 };
 
-/// What stands before the last colon and behind it; of "[IPV6]:PORT" without the brackets.
+/// Splits at the last colon; the brackets of "[IPV6]:PORT" are removed.
 HostAndPort split(const std::string& text) {
   if (text.starts_with('[')) {
     const std::size_t end = text.find(']');

@@ -6,7 +6,7 @@ namespace swiftlet {
 namespace {
 
 constexpr double kLeastTaken = 0.5;
-constexpr int kLeftOutOf = 3;  // a map's surface, every 3 s, pushes some out at any level
+constexpr int kLeftOutOf = 3;  // share 1/3; a map's surface, every 3 s, displaces some images at any level
 
 }  // namespace
 

@@ -1,12 +1,12 @@
 #pragma once
-// How much the live view sends, and how large its images are.
+// Limits how much the live view sends, and how large its images are.
 //
-// At most kMostBytes a second go to a viewer: what is sent is taken from an account that grows by kRate and
+// A viewer receives at most kMostBytes a second: bytes sent are taken from an account that grows by kRate and
 // never holds more than kBurst. Patches are always sent; images only while the account is not overdrawn. So
-// the rate of images falls at once when bytes are short, and their size and quality follow: once a second,
-// one level down where a third of them had to be left out or the quickest viewer took less than half of them,
-// one level up where the next would fit. A level that was too much is not tried again for kPause.
-// One thread. Cost: O(1).
+// the image rate drops at once when bytes are short. Size and quality follow once a second: one level down if
+// a third of the images had to be omitted or the fastest viewer took less than half of them; one level up if
+// the next level would fit. After a level was too much, no higher one is tried for kPause. One thread. Cost:
+// O(1).
 
 #include <array>
 #include <cstddef>
@@ -17,23 +17,23 @@ namespace swiftlet {
 
 class ViewBudget {
  public:
-  static constexpr double kMostBytes = 3e6;  ///< a second and viewer, of all that is sent
-  /// Bytes a second. Below kMostBytes by a burst, a map's surface (0.45 MB) and one pair of images.
+  static constexpr double kMostBytes = 3e6;  ///< per second and viewer, everything included
+  /// Bytes per second. Less than kMostBytes by a burst, a map's surface (0.45 MB) and one pair of images.
   static constexpr double kRate = 2e6;
   static constexpr double kBurst = 0.2e6;  ///< bytes
   static constexpr double kPause = 10;     ///< s
-  /// The best first. A picture of one level has about kGrowth times the bytes of the next.
+  /// Best first. A picture of one level has about kGrowth times the bytes of the next.
   static constexpr std::array<PictureSize, 5> kLevels{
       {{960, 70}, {640, 70}, {480, 60}, {320, 50}, {200, 40}}};
   static constexpr double kGrowth = 3;
 
-  /// Bytes that went to the viewers, images or not.
+  /// Bytes sent to the viewers, images or other.
   void spend(std::size_t bytes);
   void spendOnImages(std::size_t bytes);
   /// Whether images may be sent now. `now`: host's clock [s].
   [[nodiscard]] bool mayShow(double now);
-  /// At each turn; once a second the level is looked at. `taken`: asked then only, the share of the images
-  /// that the quickest viewer has taken since it was asked last.
+  /// Call at each turn; once a second the level is adapted. `taken`: called only then; share of the images
+  /// since its last call that the fastest viewer has taken.
   template <typename Taken>
   void adapt(double now, Taken&& taken) {
     if (now - looked_ < 1) return;
@@ -47,9 +47,9 @@ class ViewBudget {
   void look(double now, double taken);
 
   double account_ = kBurst;
-  double filled_ = -1;  ///< when; negative: never
+  double filled_ = -1;  ///< host time of the last refill; negative: never
   double looked_ = 0;
-  double up_from_ = 0;  ///< no level up before
+  double up_from_ = 0;  ///< no level up before this time
   std::size_t level_ = 1;
   std::size_t spent_ = 0, on_images_ = 0;  ///< since looked_
   int offered_ = 0, left_out_ = 0;         ///< instants, since looked_

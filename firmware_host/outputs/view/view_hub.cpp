@@ -17,7 +17,7 @@ void ViewHub::publish(const Text& patch) {
         place.waiting.push_back(patch);
         continue;
       }
-      // A document that was not taken yet goes with the patches: it is older than they are.
+      // A waiting document is dropped with the patches, since it is older than they are.
       counters_.dropped += 1 + place.waiting.size() - place.documents_waiting;
       place.waiting.clear();
       place.documents_waiting = 0;

@@ -23,10 +23,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kGrace = 0.5;        // s: for viewers to take the end
+constexpr double kGrace = 0.5;        // s, for viewers to receive the end
 constexpr double kLookForNews = 0.1;  // s
 constexpr int kMostStart = 5000;      // ms
-constexpr int kSendBuffer = 131072;   // bytes: what a slow viewer has waiting is old when it comes
+constexpr int kSendBuffer = 131072;   // bytes; more would only be old data by the time a slow viewer reads it
 constexpr const char* kHtml = "text/html; charset=utf-8";
 
 /// A connection as the library reads and writes it.
@@ -39,7 +39,7 @@ class Stream : public httplib::Stream {
     return static_cast<ssize_t>(connection_.read(to, size));
   }
   ssize_t write(const char* from, std::size_t size) override { return connection_.write(from, size); }
-  // Nobody asks whom one talks to.
+  // Not used by the answers.
   void get_remote_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
   void get_local_ip_and_port(std::string& /*ip*/, int& /*port*/) const override {}
   [[nodiscard]] socket_t socket() const override { return connection_.socket(); }
@@ -57,7 +57,7 @@ class Tasks : public httplib::TaskQueue {
   LowThreads threads_;
 };
 
-/// The connection that is answered, for the one callback that gets none.
+/// The connection being answered, for the one callback that does not receive it.
 thread_local Connection* answering = nullptr;
 
 }  // namespace
@@ -72,7 +72,7 @@ class ViewServer::Work : public httplib::Server {
     });
     set_socket_options([](socket_t socket) {
       const int on = 1;
-      // Without SO_REUSEPORT, with which two programs would share the port.
+      // Without SO_REUSEPORT, which would let two programs share the port.
       setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
       setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &kSendBuffer, sizeof(kSendBuffer));
     });
@@ -113,7 +113,7 @@ class ViewServer::Work : public httplib::Server {
       static_cast<void>(listen_after_bind());
     });
     if (!report.started) throw InputError("--view", 0, address_.text(), report.message, "");
-    // Before that, stop() would stop nothing.
+    // stop() has no effect before the server is running.
     for (int i = 0; i < kMostStart && !is_running(); ++i) sleepFor(Duration::fromMilliseconds(1));
   }
 
@@ -125,12 +125,12 @@ class ViewServer::Work : public httplib::Server {
     const InputError said("--view", 0, address_.text(), what,
                           taken ? "Choose another with --view ADDRESS:PORT, or port 0 for any that is free"
                                 : "Give --view an address of this host and a port that this user may have");
-    // An address comes with its network, and a port goes with the program that has it: a service that ends by
-    // this is started again, one that ends by an InputError is not.
+    // The address may come up with its network, and the port may be freed by another program: a service that
+    // ends with this exception is restarted, one that ends with an InputError is not.
     throw std::runtime_error(said.what());
   }
 
-  // In place of the library's own, whose reads and writes know no end of the whole.
+  // Replaces the library's function, whose reads and writes have no overall deadline.
   bool process_and_close_socket(socket_t socket) override {
     Connection connection(socket, deadline_, kPatience);
     bool done = false;
@@ -155,7 +155,7 @@ class ViewServer::Work : public httplib::Server {
       return say(response, 403, "ask for this host by its address, or from a page of this server\n");
     }
     if (request.method != "GET") return say(response, 405, "GET is all that there is\n");
-    // Browsers ask for it without the page's query.
+    // Browsers request it without the page's query.
     if (request.path == "/favicon.ico") {
       response.status = 204;
       return;
@@ -204,7 +204,7 @@ class ViewServer::Work : public httplib::Server {
         [this, place, connection](bool /*success*/) { hub_.leave(place, connection->gaveUp()); });
   }
 
-  /// Sends until the viewer goes or the run ends.
+  /// Sends until the viewer leaves or the run ends.
   bool follow(int place, httplib::DataSink& sink) {
     for (;;) {
       ViewHub::Text text;
@@ -226,7 +226,7 @@ class ViewServer::Work : public httplib::Server {
 
   ViewHub& hub_;
   ViewAddress address_;
-  const std::string token_;  ///< empty: none is needed
+  const std::string token_;  ///< empty: not required
   ViewPages pages_;
   std::atomic<double> deadline_{std::numeric_limits<double>::infinity()};
   FlightThread thread_;

@@ -17,14 +17,14 @@ namespace {
 
 constexpr double kSamplePeriod = 0.05;  // s
 constexpr int kSamplesPerPatch = 4;
-constexpr double kDocumentPeriod = 0.25;  // s: at most so often
+constexpr double kDocumentPeriod = 0.25;  // s; documents are not made more often
 
 std::string livePageText() {
   const ReportProgram program = readReportProgram();
   return program.name.empty() ? "" : livePage(program.text, program.name);
 }
 
-/// Without the page's program: figures as text, asked for again every second.
+/// Used without the page's program: figures as text, reloaded every second.
 std::string plainLivePage(const std::string& text) {
   return "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
          "<meta http-equiv=\"refresh\" content=\"1\"><title>swiftlet live</title></head>"
@@ -101,7 +101,7 @@ class ViewThread::Work final : public Follower::Work {
 
   void publish(double now) {
     document_.setViewers(toJson(hub_.counters()));
-    // Made in any case: what came is counted as sent by it.
+    // Made even without viewers, because patch() marks changes as sent.
     const ViewHub::Text patch = message("patch", document_.patch());
     hub_.publish(patch);
     budget_.spend(patch->size());
@@ -121,9 +121,9 @@ class ViewThread::Work final : public Follower::Work {
   LiveImages images_;
   ViewBudget budget_;
   LiveDocument document_;
-  const std::string page_;  ///< empty: this installation has none
+  const std::string page_;  ///< empty: not installed
   double document_made_ = 0;
-  std::mutex mutex_;  ///< between this thread and those that answer
+  std::mutex mutex_;  ///< between this thread and the answering ones
   std::string text_;
   std::unique_ptr<ViewServer> server_;
   ViewAddress address_;

@@ -1,7 +1,7 @@
 #pragma once
-// The live view of a run (docs/view.md): takes the newest of it, from a low thread of its own at its own
-// pace, and serves it. It reads a LiveOutlet; nobody waits for it. In builds without cpp-httplib the
-// constructor says so.
+// The live view of a run (docs/view.md): a low-priority thread of its own takes the run's newest values at
+// its own pace and serves them. It reads a LiveOutlet; nobody waits for it. In builds without cpp-httplib the
+// constructor throws an error that says so.
 
 #include <string>
 
@@ -14,12 +14,12 @@ namespace swiftlet {
 
 class ViewThread : public Follower {
  public:
-  /// Listens and begins. std::runtime_error naming --view where the address cannot be had. `outlet` outlives
-  /// it. `name`: what the page calls the run. Its end tells the viewers, and takes a second at most. `rig`:
-  /// the cameras in use, whose images are shown where the outlet has them.
+  /// Starts listening. std::runtime_error naming --view if the address is not available. `outlet` outlives
+  /// this object. `name`: the run's name on the page. `rig`: the cameras in use, whose images are shown if
+  /// the outlet has them. Ending it notifies the viewers and takes at most a second.
   ViewThread(LiveOutlet& outlet, const ViewAddress& address, const std::string& name, const Rig& rig);
 
-  /// "http://127.0.0.1:8320/", with the port that it has got, and the token where one is needed.
+  /// "http://127.0.0.1:8320/" with the actual port, and the token if one is required.
   [[nodiscard]] std::string url() const;
 
  private:

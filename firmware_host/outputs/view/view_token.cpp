@@ -17,7 +17,7 @@ constexpr std::size_t kRandomBytes = 16;
 
 std::string randomToken() {
   std::array<unsigned char, kRandomBytes> bytes{};
-  // Up to 256 bytes come whole, once the kernel has gathered entropy after boot.
+  // Requests of up to 256 bytes are always complete once the kernel has gathered entropy after boot.
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
     throw InputError("--view", 0, "", "the kernel gives no random numbers for a token",
                      std::string("Set ") + kViewTokenVariable);
@@ -46,7 +46,7 @@ std::string viewToken(const ViewAddress& address) {
 }
 
 bool sameToken(std::string_view expected, std::string_view given) {
-  // How long the token is may be known; every character is compared.
+  // The token's length may leak; every character is compared.
   unsigned difference = expected.size() == given.size() ? 0 : 1;
   for (std::size_t i = 0; i < given.size() && !expected.empty(); ++i) {
     difference |=

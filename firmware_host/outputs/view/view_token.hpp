@@ -1,5 +1,5 @@
 #pragma once
-// The secret that a viewer has to know where the live view is served beyond loopback.
+// The secret that viewers must know if the live view is served beyond loopback.
 
 #include <cstddef>
 #include <string>
@@ -9,15 +9,17 @@
 
 namespace swiftlet {
 
-/// Names a token of the user's own: for a service, whose printed address nobody reads at each start.
+/// Environment variable with the user's own token, for services, whose printed address is not read at each
+/// start.
 inline constexpr const char* kViewTokenVariable = "SWIFTLET_VIEW_TOKEN";
-inline constexpr std::size_t kLeastToken = 16;  ///< characters of one's own
+inline constexpr std::size_t kLeastToken = 16;  ///< characters of a user's own token
 
-/// Empty on loopback; else the user's own, or 128 random bits of the kernel's in hexadecimal digits.
-/// InputError naming the variable where its token is short, or has characters that an address has not.
+/// Empty on loopback; otherwise the user's own token, or 128 random bits from the kernel as hexadecimal
+/// digits. InputError naming the variable if its token is too short or has characters that are not allowed in
+/// an address.
 std::string viewToken(const ViewAddress& address);
 
-/// In a time that does not depend on where they differ.
+/// Compares in a time that does not depend on where the tokens differ.
 [[nodiscard]] bool sameToken(std::string_view expected, std::string_view given);
 
 }  // namespace swiftlet
