@@ -10,9 +10,9 @@ namespace {
 
 constexpr int kLevels = 4;
 constexpr int kTracks = 120;
-// Brightness is compared at a level whose pixel is the mean of some 6 x 6.
+// Brightness is compared at a pyramid level whose pixels average about 6 x 6 pixels.
 constexpr int kLightLevel = 2;
-// Grey levels between which a camera's answer to light is about linear.
+// Grey levels between which a camera's response to light is roughly linear.
 constexpr float kDark = 16;
 constexpr float kBright = 240;
 

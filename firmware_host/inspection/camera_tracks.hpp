@@ -1,8 +1,8 @@
 #pragma once
-// Corners followed through the images of one camera, without any knowledge of motion, lens or clock: what
-// the checks of inspection.hpp measure on.
+// Follows corners through the images of one camera without knowledge of motion, lens or clock: the
+// measurements for the checks of inspection.hpp.
 //
-// Memory: two pyramids, and 12 bytes a point (some 1.5 KB an image). Cost: about 1.5 ms for 752 x 480.
+// Memory: two pyramids, and 12 bytes per point (some 1.5 KB per image). Cost: about 1.5 ms for 752 x 480.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -23,19 +23,19 @@ struct TrackedPoint {
 
 struct TrackedImage {
   Stamp stamp;
-  bool follows = false;              ///< tracks go on from the image before
-  std::vector<TrackedPoint> points;  ///< by rising track
-  std::size_t kept = 0;              ///< points of tracks that the image before has too
+  bool follows = false;              ///< tracks continue from the previous image
+  std::vector<TrackedPoint> points;  ///< ordered by track
+  std::size_t kept = 0;              ///< points whose track is also in the previous image
   float flow = 0;                    ///< px, median displacement of these
-  float light = 1;                   ///< median ratio of their brightness to that in the image before
+  float light = 1;                   ///< median ratio of their brightness to that in the previous image
 };
 
 class CameraTracks {
  public:
-  /// `follows`: the image comes directly after the one before; otherwise all tracks end.
+  /// `follows`: the image directly follows the previous one; otherwise all tracks end.
   void add(Stamp stamp, const ImageView& image, bool follows);
   [[nodiscard]] const std::vector<TrackedImage>& images() const { return images_; }
-  /// Of the newest image.
+  /// Pyramid of the newest image.
   [[nodiscard]] const Pyramid& newest() const { return pyramid_[newest_]; }
 
  private:
@@ -54,7 +54,7 @@ struct TrackPair {
   Eigen::Vector2d from = Eigen::Vector2d::Zero();
   Eigen::Vector2d to = Eigen::Vector2d::Zero();
 };
-/// Tracks that both images have.
+/// Tracks that are in both images.
 std::vector<TrackPair> commonTracks(const TrackedImage& from, const TrackedImage& to);
 
 }  // namespace swiftlet

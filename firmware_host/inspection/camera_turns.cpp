@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kPixelSigma = 0.6;
 constexpr std::size_t kFewestOfTurn = 20;
-// An image time apart by more than this many steps is another stretch of the log.
+// Longest time between two images of one turn; a longer gap separates stretches of the log.
 constexpr double kLongestTurnTime = 0.5;  // s
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-// How a camera turned between images, and what a gyro says of the same times.
+// Rotations of a camera between images, and the gyro's rotations at the same times.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -13,21 +13,21 @@
 namespace swiftlet {
 
 struct CameraTurn {
-  double from = 0;  ///< s of the image stamps since `origin`
+  double from = 0;  ///< s, stamp of the first image since `origin`
   double to = 0;
-  std::size_t first = 0;  ///< images
+  std::size_t first = 0;  ///< indices of the images
   std::size_t last = 0;
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< rotation vector [rad] in the camera's axes
 };
 
-/// Turns between images that follow each other, at least kLeastTurnTime apart, by RANSAC of the five-point
-/// problem: nothing of the motion has to be known. Pairs without consensus are left out.
+/// Rotations between consecutive images at least kLeastTurnTime apart, by RANSAC over the five-point problem,
+/// so the motion need not be known. Pairs without consensus are omitted.
 std::vector<CameraTurn> cameraTurns(const std::vector<TrackedImage>& images, const CameraModel& camera,
                                     Stamp origin);
-inline constexpr double kLeastTurnTime = 0.08;  // s: longer turns stand out of the tracks' noise
+inline constexpr double kLeastTurnTime = 0.08;  // s; longer turns exceed the noise of the tracks
 
-/// The integral of the rates from the first sample on. Components add up, which is a rotation for the small
-/// angles between images only, but stays true to a gyro in any unit and any axes.
+/// Integral of the rates from the first sample on. Components are summed, which is a rotation only for the
+/// small angles between images, but also works for a gyro in any unit and any axes.
 class GyroIntegral {
  public:
   GyroIntegral(const std::vector<ImuSample>& samples, Stamp origin);

@@ -6,14 +6,14 @@
 namespace swiftlet {
 
 struct Finding {
-  std::string what;      ///< the mistake, a few words
-  std::string evidence;  ///< what the data say beside what they should say, with units
+  std::string what;      ///< the mistake, in a few words
+  std::string evidence;  ///< what the data show and what is expected, with units
   std::string remedy;    ///< what to change
 
   [[nodiscard]] std::string line() const { return what + ": " + evidence + ". " + remedy + "."; }
 };
 
-/// What the data say, beside what the calibration says.
+/// A value measured from the data, compared with the calibration.
 struct Measured {
   std::string what;
   std::string found;

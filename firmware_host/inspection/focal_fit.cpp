@@ -12,16 +12,16 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kSteps = 22;  // each way, to 0.41 and 2.4 times
+constexpr int kSteps = 22;  // in each direction, to ratios of 0.41 and 2.4
 constexpr double kStep = 0.04;
-constexpr int kStride = 4;  // steps at first; the minimum is wider
-// px, of a track's distance from its epipolar line; where errors stop counting
+constexpr int kStride = 4;  // steps in the first search; the minimum is wider
+// px, a track's distance from its epipolar line; errors beyond are down-weighted
 constexpr double kEpipolarNoise = 0.5;
 constexpr std::size_t kMostTurns = 150;
 constexpr int kRounds = 3;
 constexpr std::size_t kFewestOfFocal = 20;
 
-/// Tracks of a turn, and the gyro's rotation of it.
+/// Tracks of one turn, and the gyro's rotation for it.
 struct TurnTracks {
   std::vector<TrackPair> pairs;
   Eigen::Matrix3d R_cur_prev;
@@ -33,7 +33,7 @@ CameraModel scaled(const CameraModel& camera, double ratio) {
   return {camera.kind(), camera.width(), camera.height(), intrinsics, camera.distortion()};
 }
 
-/// Robust sum of squared distances from epipolar lines, in units of kEpipolarNoise squared, at the best
+/// Robust sum of squared distances from the epipolar lines, in units of kEpipolarNoise squared, for the best
 /// translation.
 double costOf(const TurnTracks& turn, const CameraModel& camera) {
   std::vector<Eigen::Vector3d> normals;
@@ -46,7 +46,7 @@ double costOf(const TurnTracks& turn, const CameraModel& camera) {
     normals.push_back(from.cross(to));
     rays.push_back({from, to});
   }
-  constexpr double kWorst = 6;  // of a pair that the lens cannot have seen
+  constexpr double kWorst = 6;  // for a pair that the lens cannot have seen
   const double cost = kWorst * static_cast<double>(turn.pairs.size() - normals.size());
   std::vector<double> weights(normals.size(), 1);
   double left = 0;
@@ -72,7 +72,7 @@ std::optional<FocalFit> fitFocal(const std::vector<TrackedImage>& images,
                                  const std::vector<CameraTurn>& turns, const GyroIntegral& gyro,
                                  const MotionFit& fit, const Eigen::Matrix3d& gyro_to_camera,
                                  const CameraModel& camera) {
-  // The largest turns tell most.
+  // The largest turns are the most informative.
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < turns.size(); ++k) {
     if (fit.weights[k] > 0.3) order.push_back(k);
@@ -99,7 +99,7 @@ std::optional<FocalFit> fitFocal(const std::vector<TrackedImage>& images,
   };
   constexpr std::size_t kFewestTurns = 15;
   if (tracks.size() < kFewestTurns) return {};
-  // Steps from the calibration's own, so that they are compared at equal ground.
+  // Ratios are steps from the calibrated one, so all are compared in the same way.
   std::map<int, double> costs;
   const auto at = [&](int step) {
     const auto [entry, fresh] = costs.try_emplace(step, 0.0);

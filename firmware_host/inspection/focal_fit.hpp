@@ -1,6 +1,6 @@
 #pragma once
-// Focal length by the gyro: with the true one, what is left of the tracks after the gyro's turn is taken off
-// points away from one point, as a translation alone moves a scene.
+// Focal length from the gyro: with the true focal length, tracks with the gyro's rotation removed move
+// towards or away from one point, as under pure translation.
 
 #include <optional>
 #include <vector>
@@ -11,15 +11,14 @@
 namespace swiftlet {
 
 struct FocalFit {
-  double ratio = 1;  ///< focal length of the log over that of the calibration
-  double sigma = 1;  ///< of the ratio, relative
-  double gain = 0;   ///< log likelihood of `ratio` above that of 1
+  double ratio = 1;  ///< focal length of the log over the calibrated one
+  double sigma = 1;  ///< relative sigma of the ratio
+  double gain = 0;   ///< log likelihood of `ratio` minus that of 1
 };
 
-/// Distances from epipolar lines are minimized over the focal length, with the gyro's rotations (through
-/// `gyro_to_camera`, a rotation
-/// times a unit) and the best direction of translation of each turn. Nothing where it is not bracketed.
-/// Cost: 2 ms a turn.
+/// Minimizes the distances from epipolar lines over the focal length, using the gyro's rotations (through
+/// `gyro_to_camera`, a rotation times a unit) and for each turn the best direction of translation. Empty if
+/// the minimum is not bracketed. Cost: 2 ms per turn.
 std::optional<FocalFit> fitFocal(const std::vector<TrackedImage>& images,
                                  const std::vector<CameraTurn>& turns, const GyroIntegral& gyro,
                                  const MotionFit& fit, const Eigen::Matrix3d& gyro_to_camera,

@@ -10,14 +10,14 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kWindow = 1.2;  // s: accelerations change, and tracks live on
+constexpr double kWindow = 1.2;  // s; short, because accelerations must change and tracks survive
 constexpr std::size_t kImagesOfWindow = 10;
 constexpr std::size_t kFewestSightings = 5;
 constexpr std::size_t kFewestOfWindow = 12;
-// The second smallest error above the smallest, for a window that fixes its unknowns.
+// Least ratio of the second smallest error to the smallest for a window that determines its unknowns.
 constexpr double kDistinct = 4;
-constexpr double kLeastSquare = 1e-9;  // rad^2: no tracker is better than 0.01 px
-// Where the columns stand.
+constexpr double kLeastSquare = 1e-9;  // rad^2; no tracker is better than 0.01 px
+// First columns of gravity, readings and lever arm.
 constexpr int kGravityAt = 3;
 constexpr int kReadingsAt = 6;
 constexpr int kLeverAt = 15;
@@ -104,7 +104,7 @@ void ForceFitter::addWindow(const std::vector<const TrackedImage*>& images, cons
   std::size_t used = 0;
   for (const auto& [track, rays] : tracks) {
     if (rays.size() < kFewestSightings) continue;
-    // The point nearest to the rays, as a function of the unknowns.
+    // The point nearest to the rays, as a linear function of the unknowns.
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     Place pull = Place::Zero();
     const auto across = [](const Ray& ray) -> Eigen::Matrix3d {
@@ -114,7 +114,7 @@ void ForceFitter::addWindow(const std::vector<const TrackedImage*>& images, cons
       sum += across(ray);
       pull += across(ray) * bodies[ray.image].place;
     }
-    // Without parallax a point may be anywhere on its ray: it is kept near.
+    // Without parallax a point may be anywhere on its ray; this keeps it near.
     constexpr double kRegular = 1e-4;
     sum.diagonal().array() += kRegular;
     const Place point = sum.inverse() * pull;
@@ -138,7 +138,7 @@ bool ForceFit::beats(const ForceFit& other) const {
 }
 
 ForceFit ForceFitter::fit(const Eigen::Matrix3d& axes) const {
-  // Columns to v, g, s.
+  // Maps the columns to v, g, s.
   Eigen::Matrix<double, kColumns, 7> join = Eigen::Matrix<double, kColumns, 7>::Zero();
   join.topLeftCorner<kReadingsAt, kReadingsAt>().setIdentity();
   for (int j = 0; j < 3; ++j) join.block<3, 1>(kReadingsAt + 3 * j, 6) = axes.col(j);

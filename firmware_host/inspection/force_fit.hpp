@@ -1,11 +1,11 @@
 #pragma once
-// The accelerometer beside the camera: do the images see the accelerations that it measures?
+// Compares the accelerometer with the camera: do the images show the accelerations that it measures?
 //
 // In a window of about a second, with rotations from the gyro, the camera moves by v t + g t^2 / 2 + s A(t):
-// A is the accelerometer integrated twice, g gravity, s the scale of the scene, negative for an accelerometer
-// that is negated. Points that are tracked through the window make that a linear problem (as in the
-// closed-form start of Martinelli, IJCV 2014, but free of scale): the smallest mean square of the points'
-// angular errors over v, g and s. |g| / |s| is gravity as the images and the accelerometer see it.
+// A is the accelerometer integrated twice, g gravity, s the scale of the scene, negative if the accelerometer
+// is negated. With points tracked through the window this is a linear problem (as in the closed-form
+// initialization of Martinelli, IJCV 2014, but free of scale): v, g and s minimize the mean square of the
+// points' angular errors. |g| / |s| is gravity as seen by images and accelerometer.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -19,24 +19,24 @@
 namespace swiftlet {
 
 struct ForceFit {
-  std::size_t windows = 0;     ///< that fix v, g and s
+  std::size_t windows = 0;     ///< windows that determine v, g and s
   std::size_t negative = 0;    ///< of these, with s < 0
   double gravity = 0;          ///< median of |g| / |s| [m/s^2]
-  double error = 0;            ///< px, geometric mean over the windows of the points' root mean square errors
+  double error = 0;            ///< px, geometric mean over the windows of the points' rms error
   std::vector<double> errors;  ///< px, of each window
 
-  /// Whether nearly every window has a smaller error than in the other fit, regardless of the sum.
+  /// Whether nearly every window has a smaller error than in the other fit.
   [[nodiscard]] bool beats(const ForceFit& other) const;
 };
 
 class ForceFitter {
  public:
-  /// `gyro_offset` [rad/s] is taken off the rates. Cost: about 1 ms a second of images.
+  /// `gyro_offset` [rad/s] is subtracted from the rates. Cost: about 1 ms per second of images.
   ForceFitter(const std::vector<TrackedImage>& images, const std::vector<ImuSample>& samples,
               const CameraModel& camera, const SE3& T_body_cam, Duration shift,
               const Eigen::Vector3d& gyro_offset);
 
-  /// With `axes` before the accelerometer's readings. Cost: 10 us a window.
+  /// Fits with `axes` applied to the accelerometer's readings. Cost: 10 us per window.
   [[nodiscard]] ForceFit fit(const Eigen::Matrix3d& axes) const;
 
  private:

@@ -8,21 +8,21 @@
 namespace swiftlet {
 namespace {
 
-// A step is a gap from here on, in periods.
+// A step of at least this many periods is a gap.
 constexpr double kGap = 1.5;
-// Images that are missing: below this share tracks go on over them.
+// Below this share of missing images, tracks continue across them.
 constexpr double kMissingShare = 0.02;
 constexpr std::size_t kFewestMissing = 5;
-// Steps of a camera that runs evenly are within this share of the period; others are triggered by something.
+// Steps of a free-running camera are within this share of the period; other cameras are triggered.
 constexpr double kEven = 0.25;
 constexpr double kEvenShare = 0.7;
-// Doubled: the scene stands still for one step, in motion before and after it.
+// A doubled image: the scene stands still for one step, but moves before and after.
 constexpr float kStill = 0.05F;  // px
 constexpr float kMoving = 0.7F;  // px
 constexpr std::size_t kFewestTracked = 20;
 constexpr std::size_t kFewestDoubled = 3;
 constexpr double kDoubledShare = 0.01;
-// Control of exposure takes steps of some 10 % (docs/exposure.md).
+// Exposure control changes brightness in steps of about 10 % (docs/exposure.md).
 constexpr double kJump = 1.25;
 constexpr std::size_t kFewestJumps = 3;
 constexpr std::size_t kFewestOfStretch = 20;
@@ -74,7 +74,7 @@ void addDoubled(const std::vector<TrackedImage>& images, std::vector<Finding>& f
     if (!tells(i) || !tells(i + 1)) continue;
     moving += images[i].flow > kMoving ? 1 : 0;
     if (images[i].flow > kStill) continue;
-    // As often as the image may have been repeated, the motion goes on before and after.
+    // An image may be repeated up to this often; motion must continue before and after.
     constexpr std::size_t kMostRepeats = 3;
     std::size_t before = i;
     while (before > 0 && i - before < kMostRepeats && tells(before) && images[before].flow <= kStill)
@@ -136,7 +136,7 @@ std::vector<Stamp> evenStamps(const std::vector<Stamp>& stamps) {
     while (end < stamps.size() && (stamps[end] - stamps[end - 1]).seconds() < kGap * period) ++end;
     const std::size_t count = end - first;
     if (count >= kFewestOfStretch) {
-      // Least squares on the image's number, which runs from -middle to middle.
+      // Least squares over the image's number, from -middle to middle.
       const double middle = 0.5 * static_cast<double>(count - 1);
       double mean = 0;
       double slope = 0;

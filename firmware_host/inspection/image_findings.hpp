@@ -1,5 +1,5 @@
 #pragma once
-// What the stamps of a camera and its images alone tell: images left out, doubled, and brightness that jumps.
+// Findings from a camera's stamps and images alone: missing and doubled images, and brightness jumps.
 
 #include <vector>
 
@@ -9,10 +9,10 @@
 
 namespace swiftlet {
 
-/// `stamps`: of all images of camera 0, as far as the log was looked at.
+/// `stamps`: of all inspected images of camera 0.
 std::vector<Finding> imageFindings(const std::vector<Stamp>& stamps, const std::vector<TrackedImage>& images);
 
-/// The stamps on a clock that ticks evenly: of each stretch without gaps, the line through its stamps.
+/// The stamps on an even clock: for each stretch without gaps, the line fitted to its stamps.
 std::vector<Stamp> evenStamps(const std::vector<Stamp>& stamps);
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// The inspection of a recorded log: opened on its own, so that the run that follows is not touched.
+// Inspection of a recorded log, which is opened separately so that the following run is not affected.
 
 #include <cstddef>
 

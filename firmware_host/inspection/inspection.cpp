@@ -7,8 +7,8 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kAlways = 2;             // s of images at the begin
-constexpr double kAfterMotion = 1;        // s of images that are taken after motion has ended
+constexpr double kAlways = 2;             // s of images at the beginning
+constexpr double kAfterMotion = 1;        // s of images used after motion has ended
 constexpr std::size_t kStereoEvery = 10;  // images
 constexpr Duration kSameTime = Duration::fromMilliseconds(5);
 
@@ -24,7 +24,7 @@ void Inspection::add(const ImuSample& sample) {
 
 bool Inspection::moves() const {
   constexpr double kSpan = 0.25;   // s
-  constexpr double kMoves = 0.05;  // rad/s off the mean so far, which has the gyro's offset
+  constexpr double kMoves = 0.05;  // rad/s from the mean so far, which contains the gyro's offset
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0;
   for (auto it = samples_.rbegin(); it != samples_.rend(); ++it, ++count) {

@@ -19,34 +19,34 @@ namespace swiftlet {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-// A log likelihood that decides: chance gives e^-20 among the thousand shifts and 48 axes that are tried.
+// Log likelihood that decides: by chance e^-20, for the thousand shifts and 48 axes that are tried.
 constexpr double kDecides = 20;
-// And what is left of the turns must be clearly more as the calibration has it, in variance: errors of turns
-// that go on from image to image do not become less with their number.
+// In addition, the variance left with the calibration must be larger by this factor: errors of consecutive
+// turns are correlated and do not average out.
 constexpr double kClearlyWorse = 2;
 constexpr double kSigmas = 5;
-// The gyro explains the camera's turns to this share at least, where anything is said of both.
+// Least share of the camera's turns that the gyro must explain for any statement about both.
 constexpr double kExplained = 0.6;
-// Below that share, with turns this large, the two have not seen the same motion.
+// Below that share, with turns this large, camera and gyro have not seen the same motion.
 constexpr double kUnrelated = 0.25;
 constexpr double kLeastTurned = 0.5;  // deg per turn
 constexpr std::size_t kManyTurns = 60;
-// What is not worth a word: half the exposure of a dim room, for stamps at its begin in place of its middle;
-// a calibration's own error of angle, twentyfold; a lens that was focused anew.
+// Smaller deviations are not reported: half the exposure in a dim room, for stamps at the start of the
+// exposure instead of its middle; twenty times a calibration's own angular error; a refocused lens.
 constexpr double kLeastShift = 0.010;  // s
 constexpr double kLeastAngle = 4;      // deg
 constexpr double kLeastFocal = 0.05;
-// Nearer to a signed permutation than the error of a mount.
+// Closer to a signed permutation than the error of a mount.
 constexpr double kSameAxes = 15;  // deg
-// A scale that no gyro is off by, but another unit or range.
+// A gyro's scale error is never this large: a wrong unit or range.
 constexpr double kWrongScale = 1.6;
 constexpr double kLeastJitter = 0.001;  // s rms
-// Gravity by images and accelerometer, of windows that agree on it.
+// Gravity from images and accelerometer, for windows that agree on it.
 constexpr double kGravity = 9.81;
 constexpr double kGravityOff = 0.3;
 constexpr std::size_t kFewestWindows = 4;
 constexpr double kOtherSign = 0.2;
-// Smaller errors with other axes, where those that are given fit as well as they should.
+// Other axes must have errors smaller by this factor if the given ones fit well enough.
 constexpr double kClearlyBetter = 1.25;
 
 std::string directions(const Eigen::Matrix3d& R_cam_imu) {
@@ -110,7 +110,7 @@ class MotionInspector {
          "Use images and samples of the same flight, stamped with one clock"});
   }
 
-  /// Whether the accelerometer's readings have the size that gravity gives them.
+  /// Whether the size of the accelerometer's readings fits gravity.
   bool addForceLevel() {
     const ForceLevel force = forceLevel(samples_);
     if (force.hasGravity()) return true;
@@ -206,7 +206,7 @@ class MotionInspector {
     if (sigma > kLeastAngle || degrees < std::max(kLeastAngle, kSigmas * sigma)) return;
     if (!decides(fitter_.gainOverAxes(fit_, R_calibrated_))) return;
     turned_ = true;
-    // Calibration files may put the body's axes elsewhere: what counts is what was written down.
+    // The identity is more likely a missing value than a wrong one.
     if (R_calibrated_.isIdentity(1e-6)) {
       findings_.push_back({"camera and IMU with identity extrinsics",
                            fmt::format("the calibrated rotation between them is the identity; according to "
@@ -233,13 +233,13 @@ class MotionInspector {
                          "Calibrate the rig again, or use the calibration of this rig"});
   }
 
-  /// Angle by which the camera is turned from where the calibration has it.
+  /// Angle between the camera's estimated and calibrated orientations.
   [[nodiscard]] double turnedDegrees() const {
     return logSo3(Eigen::Matrix3d(fit_.R_cam_imu * R_calibrated_.transpose())).norm() * kDegrees;
   }
 
   bool addFocal() {
-    // A wrong focal length turns what is found of the axes by some degrees.
+    // A wrong focal length changes the estimated axes by some degrees.
     const Eigen::Matrix3d axes = turnedDegrees() > kSameAxes ? fit_.R_cam_imu : R_calibrated_;
     const auto focal = fitFocal(images_, turns_, gyro_, fit_, unit_ * axes, camera_);
     if (!focal) return false;
@@ -273,7 +273,7 @@ class MotionInspector {
         {"image stamps", fmt::format("{:.1f} ms rms from an even clock; the camera's rotations attribute "
                                      "{:.0f} % (sigma {:.0f} %) of it to the stamps",
                                      1e3 * rms, 100 * evenness.share, 100 * evenness.sigma)});
-    // Half of it at least, beyond doubt.
+    // At least half of it, with certainty.
     if (evenness.share - 2 * evenness.sigma < 0.5 || evenness.share < kSigmas * evenness.sigma) return;
     findings_.push_back(
         {"image stamps jitter",
@@ -304,7 +304,7 @@ class MotionInspector {
       best = other;
       axes = tried;
     }
-    // A flight need not tell all axes apart: what explains it with the least change is said.
+    // A flight need not distinguish all axes: the smallest change that explains it is reported.
     if (axes.isIdentity(1e-6)) return;
     if (agrees(force) && (best.error * kClearlyBetter > force.error || !best.beats(force))) return;
     const Eigen::Matrix3d opposite = -Eigen::Matrix3d::Identity();
@@ -313,7 +313,7 @@ class MotionInspector {
       best = negated;
       axes = opposite;
     }
-    // Where the motion is too slow to fix the sign, it does not tell axes apart either.
+    // If the motion is too slow to determine the sign, it does not distinguish axes either.
     if (!axes.isApprox(opposite) && !best.beats(force)) return;
     if (axes.isApprox(opposite)) {
       findings_.push_back(
@@ -332,7 +332,7 @@ class MotionInspector {
          "Provide the accelerometer in the gyro's axes"});
   }
 
-  /// Nearly all windows have the sign that is given, and gravity has its size.
+  /// Nearly all windows have the expected sign, and gravity has its size.
   static bool agrees(const ForceFit& force) {
     return static_cast<double>(force.negative) <= kOtherSign * static_cast<double>(force.windows) &&
            std::abs(force.gravity - kGravity) < kGravityOff * kGravity;

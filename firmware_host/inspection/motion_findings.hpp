@@ -1,5 +1,5 @@
 #pragma once
-// What gyro, accelerometer and camera tell of each other: clock, unit, axes, focal length, gravity.
+// Findings from comparing gyro, accelerometer and camera: clock, unit, axes, focal length, gravity.
 
 #include <vector>
 
@@ -10,7 +10,7 @@
 
 namespace swiftlet {
 
-/// `even`: what the stamps of `images` are on a clock that ticks evenly. Lines go to `measured`.
+/// `even`: stamps of `images` on an even clock. Measured values are added to `measured`.
 std::vector<Finding> motionFindings(const Calibration& calibration, const std::vector<ImuSample>& samples,
                                     const std::vector<TrackedImage>& images, const std::vector<Stamp>& even,
                                     std::vector<Measured>& measured);

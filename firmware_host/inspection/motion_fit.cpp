@@ -9,16 +9,16 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kFewestTurns = 25;
-constexpr double kCoarseStep = 0.02;  // s: turn rates of a vehicle hold for longer
+constexpr double kCoarseStep = 0.02;  // s; a vehicle's turn rates change more slowly
 constexpr double kFineStep = 0.001;   // s
 constexpr int kRobustRounds = 4;
 constexpr double kCauchy = 2.4;  // sigmas; 95 % efficient for normal errors
 constexpr double kToDegrees = 180 / std::numbers::pi;
-constexpr double kFastest = 12;  // rad/s: no camera tracks features through faster turns
+constexpr double kFastest = 12;  // rad/s; no camera tracks features through faster turns
 
 }  // namespace
 
-/// Weighted sums over all turns that the samples cover. Row of the regression: the gyro's turn, the time.
+/// Weighted sums over all turns covered by samples. Regressors: the gyro's turn (3) and the time.
 struct MotionFitter::Sums {
   Eigen::Matrix4d xx = Eigen::Matrix4d::Zero();
   Eigen::Matrix<double, 3, 4> yx = Eigen::Matrix<double, 3, 4>::Zero();
@@ -33,7 +33,7 @@ struct MotionFitter::Sums {
     return regular.ldlt().solve(yx.transpose()).transpose();
   }
   [[nodiscard]] double left() const { return std::max(yy - (solution().cwiseProduct(yx)).sum(), 0.0); }
-  /// Without the gyro: a constant rate alone.
+  /// Variance without the gyro, with a constant rate only.
   [[nodiscard]] double whole() const {
     return std::max(yy - (xx(3, 3) > 0 ? yx.col(3).squaredNorm() / xx(3, 3) : 0.0), 0.0);
   }
@@ -83,7 +83,7 @@ std::vector<double> MotionFitter::robustWeights(double shift, const Sums& sums) 
   if (sorted.empty()) return weights;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
-  // The median length of a normal error of three axes is 1.54 sigma.
+  // The median norm of a normal error in three axes is 1.54 sigma.
   const double sigma = std::max(*middle / 1.54, 1e-6);
   for (std::size_t k = 0; k < turns_.size(); ++k) {
     if (errors[k] < 0) continue;
@@ -114,7 +114,7 @@ std::optional<MotionFit> MotionFitter::fit(double calibrated_shift) {
     const double seconds = turns_[k].to - turns_[k].from;
     weights[k] = turns_[k].turn.norm() < kFastest * seconds ? 1 : 0;
   }
-  // As a start, the whole range; then what is left of it once false turns weigh less.
+  // First the whole range, again after false turns are down-weighted.
   double shift = scan(weights, calibrated_shift - kMaxShift, calibrated_shift + kMaxShift, kCoarseStep);
   Sums sums = sumsAt(shift, weights);
   if (sums.count < kFewestTurns) return {};
@@ -168,7 +168,7 @@ double MotionFitter::shiftStep(double shift, const std::vector<double>& weights,
 }
 
 void MotionFitter::solveAxes(const Sums& sums, MotionFit& fit) const {
-  // Without the constant rate: its part goes to the offset.
+  // Eliminates the constant rate, which becomes the offset.
   const double time = std::max(sums.xx(3, 3), 1e-12);
   const Eigen::Vector3d g = sums.xx.topRightCorner<3, 1>();
   const Eigen::Vector3d y = sums.yx.col(3);
@@ -190,7 +190,7 @@ void MotionFitter::solveAxes(const Sums& sums, MotionFit& fit) const {
   fit.scale = (d[0] + d[1] + std::abs(d[2])) / trace;
   fit.mirror_gain = 1.5 * sums.weight * std::log(left(sign) / left(-sign));
   fit.offset = (y - fit.scale * fit.R_cam_imu * g) / time;
-  // What is left under this model, which has fewer freedoms.
+  // Residual variance under this model, which has fewer parameters.
   const double variance = left(sign) / std::max(3 * sums.weight - 8, 1.0);
   const Eigen::Matrix3d in_camera = fit.R_cam_imu * G * fit.R_cam_imu.transpose();
   fit.information = fit.scale * fit.scale * (in_camera.trace() * Eigen::Matrix3d::Identity() - in_camera) /
@@ -201,7 +201,7 @@ double MotionFitter::gainOverShift(const MotionFit& fit, double shift) const {
   const Sums best = sumsAt(fit.shift, fit.weights);
   const Sums other = sumsAt(shift, fit.weights);
   if (other.count < kFewestTurns) return best.gain();
-  // Of one turn, so that a shift that leaves fewer of them in the samples is no worse for that.
+  // Normalized per turn, so that a shift with fewer covered turns is not at a disadvantage.
   const double weight = std::min(best.weight, other.weight);
   return weight * (best.gain() / best.weight - other.gain() / other.weight);
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Axes that are exchanged or negated.
+// Permutations and sign changes of axes.
 
 #include <Eigen/Core>
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace swiftlet {
 
-/// The 48 orthogonal matrices that exchange and negate axes.
+/// The 48 orthogonal matrices that permute and negate axes.
 std::vector<Eigen::Matrix3d> signedAxes();
-/// The nearest of them with the same determinant; `angle` [rad] to it.
+/// The nearest of these matrices with the same determinant; `angle` [rad] is the distance to it.
 Eigen::Matrix3d nearestSignedAxes(const Eigen::Matrix3d& orthogonal, double& angle);
-/// "x for -y, y for x": the axes that are others, `axes` * true = given.
+/// "x for -y, y for x": the axes that differ, with `axes` * true = given.
 std::string axesText(const Eigen::Matrix3d& axes);
 
 }  // namespace swiftlet

@@ -6,7 +6,7 @@ namespace swiftlet {
 namespace {
 
 constexpr int kMatcherLevels = 4;
-// False matches pass the matcher's checks for some percent of the points; far points match both ways.
+// Some percent of the points give false matches that pass the matcher's checks; far points match both ways.
 constexpr std::size_t kTimesAsMany = 3;
 constexpr std::size_t kFewestMatches = 40;
 
@@ -28,7 +28,7 @@ void StereoOrder::add(const Pyramid& image0, const TrackedImage& points, const I
     Eigen::Vector2f pixel;
     ++points_;
     if (matcher_->match(image0, 0, point.pixel, image1, pixel)) ++as_given_;
-    // What is called camera 0's image as that of camera 1.
+    // Matching with the two images exchanged.
     if (matcher_->match(image0, 1, point.pixel, image1, pixel)) ++exchanged_;
   }
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Are the images of the two cameras exchanged? Corners of one are looked for in the other as the calibration
-// has it, and with the images exchanged: points in front of both cameras are found one way only.
+// Detects exchanged camera images. Corners of one image are searched for in the other, with the calibration
+// as given and with the images exchanged: points in front of both cameras are found only in the right order.
 
 #include <cstddef>
 #include <optional>
@@ -15,11 +15,11 @@ namespace swiftlet {
 
 class StereoOrder {
  public:
-  /// Looks only where both cameras have images of one size.
+  /// Checks only if both cameras have images of the same size.
   explicit StereoOrder(const Rig& rig);
 
   [[nodiscard]] bool wantsMore() const { return matcher_ && pairs_ < kPairs; }
-  /// The newest image of camera 0 with its points, and that of camera 1 of the same time.
+  /// `image0`, `points`: the newest image of camera 0; `image1`: the image of camera 1 at the same time.
   void add(const Pyramid& image0, const TrackedImage& points, const ImageView& image1);
   [[nodiscard]] std::optional<Finding> finding() const;
 
@@ -29,7 +29,7 @@ class StereoOrder {
   std::optional<StereoMatcher> matcher_;
   std::size_t pairs_ = 0;
   std::size_t points_ = 0;
-  std::size_t as_given_ = 0;  ///< points found
+  std::size_t as_given_ = 0;  ///< points found in the given order
   std::size_t exchanged_ = 0;
 };
 
