@@ -53,7 +53,7 @@ int calibrateLogCameras(CamerasOptions options) {
   progress.finish();
   fmt::print("{}", describe(solution));
   if (!options.out.empty()) {
-    // Of a calibration that is not good too: it shows why.
+    // Also written for a bad calibration, because the page shows the reason.
     std::filesystem::create_directories(options.out);
     const std::string page = (std::filesystem::path(options.out) / "report.html").string();
     writeCalibrationPage(page, cameraPage(solution, input.target, options.log.log));

@@ -1,5 +1,5 @@
 #pragma once
-// The parts of `swiftlet calibrate`, a file for each.
+// The parts of `swiftlet calibrate`, each in its own file.
 
 #include <CLI/CLI.hpp>
 #include <string>
@@ -12,7 +12,7 @@ void addCalibrateImuCamera(CLI::App& calibrate, int& exit_code);
 void addCalibrateImuNoise(CLI::App& calibrate, int& exit_code);
 void addCalibrateCheck(CLI::App& calibrate, int& exit_code);
 
-/// The second file of `--out`: its name with this extension. InputError if that is `out` itself.
+/// Name of the second output file: `out` with this extension. InputError if that is `out` itself.
 std::string fileBeside(const std::string& out, const char* extension);
 
 }  // namespace swiftlet

@@ -45,7 +45,7 @@ std::function<void(double)> partsOf(Progress& progress) {
   };
 }
 
-/// Lenses from a file: where the batch begins.
+/// Initial lenses of the batch, read from a file.
 CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const std::string& file) {
   CameraSolution solution;
   solution.camera_count = std::min(chain.rig.camera_count, log.camera_count);
@@ -81,7 +81,7 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   options.log.show_progress = true;
   options.log.stop = &stopOnSignal();
   ImuCameraInput input;
-  // What is wrong with the files is said before the images are searched.
+  // Errors in the files are reported before images are searched.
   std::optional<CameraChain> chain;
   if (!options.cameras.empty()) chain = readCameraChain(options.cameras);
   std::vector<std::string> left_out;
@@ -110,7 +110,7 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
     progress.finish();
   }
   fmt::print("{}", describe(solution));
-  // Without a model of rolling rows the cameras' own step suspects what the batch explains.
+  // Without a rolling-shutter model, the camera-only step objects to errors that the batch explains.
   const bool cameras_count = !lenses || !solution.rig.rolls();
   for (const std::string& reason : input.cameras.reasons) {
     if (cameras_count) {

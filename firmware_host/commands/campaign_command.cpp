@@ -27,7 +27,7 @@ struct CampaignOptions {
   bool table = false;
 };
 
-/// By its name, or by its number from 1.
+/// Finds a log by its name, or by its number from 1.
 const CampaignLog& logOf(const Campaign& campaign, const CampaignOptions& options) {
   for (const CampaignLog& log : campaign.logs) {
     if (log.name == options.job) return log;
@@ -71,7 +71,7 @@ int campaign(CampaignOptions options) {
   request.program =
       own ? std::filesystem::read_symlink("/proc/self/exe") : std::filesystem::absolute(request.program);
   request.version = programVersion(request.program);
-  static_cast<void>(campaignRows(campaign, request));  // refuses a folder of another campaign
+  static_cast<void>(campaignRows(campaign, request));  // refuses the folder of another campaign
   const std::atomic<bool>& stop = stopOnSignal();
   bool whole = true;
   if (!options.job.empty()) {

@@ -1,6 +1,6 @@
 #pragma once
-// Checks of option values that read well in `--help`: CLI11's own print the mapped enumerators and
-// 300-digit bounds.
+// Checks of option values with readable `--help` texts: CLI11's own print internal enumerators and 300-digit
+// bounds.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -23,7 +23,7 @@ inline CLI::Validator numberCheck(const std::string& what, std::function<bool(do
   return CLI::Validator(check, what);
 }
 
-/// Most options are seconds: a stamp and 30 years of nanoseconds do not overflow.
+/// Most options are seconds: neither a stamp nor 30 years in nanoseconds overflows.
 inline CLI::Validator nonNegative() {
   return numberCheck("from 0 to 1e9", [](double value) { return value >= 0 && value <= 1e9; });
 }
@@ -38,8 +38,8 @@ inline CLI::Validator range(double least, double most) {
                      [least, most](double value) { return value >= least && value <= most; });
 }
 
-/// An option with a fixed list of values, in upper or lower case; help lists the values and the default, the
-/// initial content of `value`.
+/// Adds an option with a fixed list of values, in upper or lower case. Help lists the values and the default,
+/// which is the initial content of `value`.
 template <typename Enum>
 void addChoice(CLI::App& command, const std::string& option, Enum& value, const std::string& help,
                const std::vector<std::pair<std::string, Enum>>& choices) {

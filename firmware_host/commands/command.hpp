@@ -1,6 +1,5 @@
 #pragma once
-// The program's subcommands. Each adds itself to the parser and is run by it; its return value is the
-// exit code.
+// The program's subcommands. Each function adds one to the parser, which runs it and stores its exit code.
 
 #include <CLI/CLI.hpp>
 #include <string>
@@ -17,7 +16,7 @@ struct SettingsOptions {
   std::vector<std::string> overrides;
 
   void addTo(CLI::App& command);
-  /// Defaults, then the file, then the overrides. InputError.
+  /// Reads defaults, then the file, then the overrides. InputError.
   [[nodiscard]] Settings read() const;
 };
 
@@ -44,7 +43,7 @@ void addSmoothCommand(CLI::App& app, int& exit_code);
 void addViewCommand(CLI::App& app, int& exit_code);
 void addVocabularyCommand(CLI::App& app, int& exit_code);
 void addSettingsCommand(CLI::App& app, int& exit_code);
-/// Needs all others in `app` when it runs; not in the help.
+/// Call after all other commands have been added to `app`. Not listed in the help.
 void addManCommand(CLI::App& app, int& exit_code);
 
 }  // namespace swiftlet

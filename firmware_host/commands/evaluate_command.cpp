@@ -32,7 +32,7 @@ struct EvaluateOptions {
   AlignKind align = AlignKind::kSe3;
   double from = 0;
   double until = -1;
-  double fit_shift = 0;  ///< s; 0: none is fitted
+  double fit_shift = 0;  ///< s; 0: no shift is fitted
   bool json = false;
   bool mesh = false;
   std::string truth_mesh;
@@ -41,15 +41,15 @@ struct EvaluateOptions {
   SettingsOptions settings;
 };
 
-/// What is compared with what.
+/// The files to compare, and with which truth.
 struct Subject {
   std::vector<std::string> files;
-  std::string states;  ///< empty: no covariances
+  std::string states;  ///< file with covariances; empty: none
   std::string truth;
-  std::string log;  ///< that the run was made from, or that holds the truth; empty: none known
+  std::string log;  ///< log of the run, or log that holds the truth; empty: unknown
   std::optional<Stamp> first_image;
-  Duration shift;            ///< from the clock of the files to that of the truth
-  bool from_tracks = false;  ///< the log need not hold images
+  Duration shift;            ///< from the files' clock to the truth's
+  bool from_tracks = false;  ///< the log may be without images
 };
 
 Json readSummary(const std::filesystem::path& path) {
@@ -113,7 +113,7 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
   return evaluateMeshes(request, readEstimate(subject.files.front()), truth.poses, accuracy_options);
 }
 
-// map.tum beside odometry.tum at the stamps of both, and how much there was to revisit.
+// Compares map.tum with odometry.tum at common stamps, and reports revisits and loops.
 void compareMap(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
                 const AccuracyOptions& accuracy_options, const EvaluationGroup& settings, Json& json) {
   const std::filesystem::path run(options.run);
@@ -150,7 +150,7 @@ int evaluateHil(const EvaluateOptions& options) {
   return verdict.passed() ? kExitDone : kExitFailed;
 }
 
-/// Poses before and after are left out.
+/// Omits poses before and after the section.
 void setSection(const EvaluateOptions& options, Stamp zero, AccuracyOptions& accuracy) {
   if (options.from > 0) accuracy.association.from = zero + Duration::fromSeconds(options.from);
   if (options.until >= 0) accuracy.association.until = zero + Duration::fromSeconds(options.until);
@@ -222,7 +222,7 @@ int evaluate(const EvaluateOptions& options) {
     LogWarnings left_out;
     const Trajectory estimate = readEstimate(file, left_out);
     warnAll(left_out.lines());
-    // Without a log the zero of time is the estimate's own first pose.
+    // Without a log, time starts at the estimate's first pose.
     const Stamp zero = subject.first_image ? *subject.first_image
                        : truth.first_image ? *truth.first_image
                                            : estimate.front().stamp;

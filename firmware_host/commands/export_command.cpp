@@ -39,8 +39,8 @@ struct ExportOptions {
   RosFrames frames;
 };
 
-/// Empty where the run's log is gone or has none: a run is exported without. A truth that was asked for must
-/// be there.
+/// Empty if the run's log is missing or has no truth: the run is then exported without. A truth given as an
+/// option must exist.
 Trajectory truthOf(const ExportOptions& options, const RunFolder& run) {
   if (options.no_truth) return {};
   if (!options.truth.empty()) return onImageClock(readTruth(options.truth, run.from_tracks).poses, run.shift);
@@ -53,7 +53,7 @@ Trajectory truthOf(const ExportOptions& options, const RunFolder& run) {
   }
 }
 
-/// Of `things`; empty names do not count.
+/// InputError if a name occurs twice; empty names are ignored. `things`: what is named, for the message.
 void refuseRepeated(const std::vector<std::string>& names, const std::string& things) {
   std::set<std::string> seen;
   for (const std::string& name : names) {
@@ -80,7 +80,7 @@ void checkFiles(const ExportOptions& options) {
   refuseRepeated(names, "files");
 }
 
-/// Each bag that is asked for.
+/// Writes each requested bag.
 void writeBags(const ExportOptions& options, const std::function<void(MessageBag&)>& fill) {
   for (const auto& [form, path] :
        {std::pair{BagForm::kRos1, options.bag}, std::pair{BagForm::kMcap, options.mcap},

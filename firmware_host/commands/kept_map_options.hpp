@@ -1,5 +1,5 @@
 #pragma once
-// The options of kept maps, the same for a flight and a replay.
+// Options for kept maps, shared by flight and replay.
 
 #include <CLI/CLI.hpp>
 
@@ -7,7 +7,7 @@
 
 namespace swiftlet {
 
-/// `request` outlives the parsing.
+/// `request` must outlive the parsing.
 void addKeptMapOptions(CLI::App& command, KeptMapRequest& request);
 
 }  // namespace swiftlet

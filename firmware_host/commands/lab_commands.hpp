@@ -1,5 +1,5 @@
 #pragma once
-// What the program can do away from the vehicle; a build without SWIFTLET_BUILD_LAB has none of it.
+// Commands and functions of the lab; a build without SWIFTLET_BUILD_LAB has none of them.
 
 #include <CLI/CLI.hpp>
 #include <memory>
@@ -15,8 +15,8 @@ namespace swiftlet {
 void addLabCommands(CLI::App& app, int& exit_code);
 /// Empty without the lab.
 AccuracyOfRun labAccuracy();
-/// Guidance of a recording in front of the board that the file describes; `view`: where it is shown beside
-/// the console. InputError without the lab.
+/// Guidance for a recording in front of the board described by the file. `view`: where it is shown in
+/// addition to the console. InputError without the lab.
 std::unique_ptr<RecordWatcher> labGuidance(const std::string& board, const std::optional<ViewAddress>& view);
 
 }  // namespace swiftlet

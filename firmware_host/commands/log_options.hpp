@@ -15,7 +15,7 @@ struct LogCommandOptions {
 
   void addCalibration(CLI::App& command);
   void addSection(CLI::App& command, LogRequest& request);
-  /// What was given, progress on stderr, and signals that stop the run. InputError.
+  /// Copies the options, shows progress on stderr, and lets signals stop the run. InputError.
   void fill(LogRequest& request) const;
 };
 

@@ -13,7 +13,7 @@
 namespace swiftlet {
 namespace {
 
-/// Today, or the day that packagers set for builds that can be repeated (SOURCE_DATE_EPOCH, seconds).
+/// Today, or the date that packagers set for reproducible builds (SOURCE_DATE_EPOCH, seconds).
 std::string dateOfPage() {
   const char* epoch = std::getenv("SOURCE_DATE_EPOCH");
   constexpr int kDecimal = 10;
@@ -25,7 +25,7 @@ std::string dateOfPage() {
 
 void addManCommand(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("man", "Print the manual page in the format of man(1)");
-  command->group("");  // for the build: users have `man swiftlet`
+  command->group("");  // hidden: for the build; users have `man swiftlet`
   command->footer("Example:\n  swiftlet man > swiftlet.1 && man ./swiftlet.1");
   command->callback([&app, &exit_code] {
     const auto version = versionJson().at("swiftlet").get<std::string>();

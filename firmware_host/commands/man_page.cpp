@@ -36,7 +36,7 @@ constexpr const char* kSeeAlso =
 
 bool isExample(const std::string& line) { return line.starts_with("  "); }
 
-/// Prose is filled; the indented lines of an example stay as they are.
+/// Prose is filled; indented lines of examples keep their line breaks.
 std::string footer(const std::string& text) {
   std::string page;
   bool example = false;
@@ -78,7 +78,7 @@ std::string usage(const CLI::App& command) {
   return line;
 }
 
-/// `before`: the program, and the command that it is a part of.
+/// `before`: name of the program and of the parent commands.
 void addCommand(const std::string& before, const CLI::App& command, std::string& page) {
   const std::string name = before + " " + command.get_name();
   const auto parts = command.get_subcommands({});

@@ -12,7 +12,7 @@ namespace swiftlet {
 /// `date` (YYYY-MM-DD) is printed in the page's footer.
 std::string manPage(const CLI::App& app, const std::string& version, const std::string& date);
 
-/// Plain text as roff takes it: no character of it is a command, a hyphen stays one when copied.
+/// Plain text escaped for roff: no character acts as a command, and hyphens can be copied.
 std::string escapeRoff(const std::string& text);
 
 }  // namespace swiftlet

@@ -14,7 +14,7 @@
 namespace swiftlet {
 namespace {
 
-/// An empty name would be that of the current folder.
+/// An empty name would mean the current folder.
 void refuseEmptyOut(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands({})) {
     if (CLI::Option* out = command->get_option_no_throw("--out")) {

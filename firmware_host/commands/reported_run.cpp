@@ -22,7 +22,7 @@ ReportedRun readReportedRun(const std::string& folder, const std::string& given_
       truth = readTruth(source, true);
       truth.poses = onImageClock(std::move(truth.poses), cameraToImuShift(files.summary));
     } catch (const InputError& error) {
-      // That a log has no truth is no fault of the run; a truth that was asked for has to be there.
+      // A log without truth is no error of the run; a truth given as an option must exist.
       if (!given_truth.empty()) throw;
       files.missing.push_back({"truth", error.what()});
     }

@@ -1,5 +1,5 @@
 #pragma once
-// A run folder beside its truth, as `report` and `view` show it.
+// A run folder and its truth, for `report` and `view`.
 
 #include <string>
 
@@ -8,8 +8,8 @@
 
 namespace swiftlet {
 
-/// `truth`: log or file; empty: the log that the run was made from. What is missing or damaged is noted in
-/// the run; InputError where there is no run, or no truth of that name.
+/// `truth`: log or file; empty: the log of the run. Missing or damaged files are noted in the result.
+/// InputError if there is no run, or if a given `truth` does not exist.
 ReportedRun readReportedRun(const std::string& folder, const std::string& truth, const Settings& settings);
 
 }  // namespace swiftlet

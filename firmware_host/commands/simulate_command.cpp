@@ -98,7 +98,7 @@ void refuseRealLog(const std::filesystem::path& folder) {
 }
 
 int simulate(const SimulateOptions& options) {
-  static_cast<void>(options.settings.read());  // complains about wrong settings as every command does
+  static_cast<void>(options.settings.read());  // reports wrong settings as every command does
   refuseRealLog(options.out);
   SimulationSettings settings = options.simulation;
   settings.imu.vibration.accel_amplitude = options.vibration;

@@ -1,5 +1,5 @@
 #pragma once
-// What the user, systemd and the terminal may do to a run: end it cleanly, or not at all.
+// How signals from user, systemd and terminal act on a run: they end it cleanly or not at all.
 
 #include <atomic>
 

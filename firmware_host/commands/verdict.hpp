@@ -1,5 +1,5 @@
 #pragma once
-// The exit code of a run that went to its end.
+// Exit code of a run that finished.
 
 #include <fmt/format.h>
 

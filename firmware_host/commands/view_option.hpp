@@ -14,7 +14,7 @@ struct ViewOption {
   CLI::Option* option = nullptr;
 
   CLI::Option* addTo(CLI::App& command);
-  /// Where to serve; empty: nowhere. InputError.
+  /// Address to serve; empty: the view is off. InputError.
   [[nodiscard]] std::optional<ViewAddress> read() const;
 };
 

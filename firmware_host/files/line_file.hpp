@@ -1,6 +1,6 @@
 #pragma once
-// A text file written line by line, each line handed to the system at once: what a run has found is
-// there to read while it flies, and after it ends badly. InputError when a file cannot be written.
+// A text file written line by line, each line handed to the operating system at once: a run's results can be
+// read during the run and after a crash. InputError if the file cannot be written.
 
 #include <cstdio>
 #include <memory>

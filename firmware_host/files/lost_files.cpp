@@ -7,7 +7,7 @@ namespace swiftlet {
 
 void LostFiles::add(std::string_view what) {
   count_.fetch_add(1, std::memory_order_relaxed);
-  // A terminal that is gone is no reason to fail either: the result is not looked at.
+  // A missing terminal is no reason to fail: the result is ignored.
   std::fprintf(stderr, "warning: %.*s (the run continues without it)\n", static_cast<int>(what.size()),
                what.data());
   if (claimed_.exchange(true, std::memory_order_relaxed)) return;

@@ -12,12 +12,12 @@ namespace swiftlet {
 
 class LostFiles {
  public:
-  static constexpr std::size_t kMostText = 400;  ///< bytes of the first one's text; a path and a reason
+  static constexpr std::size_t kMostText = 400;  ///< bytes; most of the first text, a path and a reason
 
   /// `what` names the file and the reason.
   void add(std::string_view what);
 
-  /// The first of them, cut to kMostText; null: none so far. Valid and unchanged as long as this lives.
+  /// The first text, cut to kMostText; null: none so far. Valid and unchanged as long as this object.
   [[nodiscard]] const char* problem() const;
   [[nodiscard]] std::uint32_t count() const { return count_.load(std::memory_order_relaxed); }
 

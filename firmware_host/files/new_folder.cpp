@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// With a slash at its end too.
+/// Also for a path that ends with a slash.
 fs::path folderOf(const std::string& path) {
   const fs::path folder = fs::path(path).lexically_normal();
   return folder.has_filename() ? folder : folder.parent_path();

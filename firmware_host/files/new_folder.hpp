@@ -1,8 +1,7 @@
 #pragma once
-// A folder that is there as a whole or not at all: it is filled as `<folder>.part` and renamed.
+// A folder that appears completely or not at all: it is filled as `<folder>.part` and renamed.
 //
-// One that is there already is never written over. InputError names the folder, the system's reason and the
-// remedy.
+// An existing folder is never overwritten. InputError names the folder, the system's reason and the remedy.
 
 #include <filesystem>
 #include <string>
@@ -12,14 +11,14 @@ namespace swiftlet {
 
 class NewFolder {
  public:
-  /// `names`: of all the files that may be in it. What a run that was killed left of them goes.
+  /// `names`: all files that may be in the folder. Files of these names left by a killed run are removed.
   NewFolder(const std::string& path, std::vector<std::string> names);
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
-  /// Without commit() before, the files go.
+  /// Removes the files unless commit() was called.
   ~NewFolder();
 
-  /// Where to write one of the names to.
+  /// Path at which to write the file `name`.
   [[nodiscard]] std::string file(const std::string& name) const { return (part_ / name).string(); }
   [[nodiscard]] std::string path() const { return path_.string(); }
   void commit();

@@ -34,24 +34,24 @@ constexpr std::array kMapFiles = {"map.glb", "map.ply", "summary.json", "traject
 constexpr std::array kPlaceFiles = {"places.csv", "summary.json"};
 constexpr std::size_t kNumberDigits = 6;
 constexpr std::uint32_t kLargestNumber = 999'999;
-/// A board without a battery starts in 1970, or at the date of its image: 2020 and later is taken for set.
+/// A board without a battery starts in 1970 or at its image's date; a clock in 2020 or later counts as set.
 constexpr int kFirstSetYear = 2020;
 constexpr int kTriesForName = 1000;
 constexpr const char* kFlightsRemedy = "Make flights.folder writable, or choose another one";
 
-/// As in the mark; by RunKind.
+/// Words in the mark, indexed by RunKind.
 constexpr std::array kWords = {"replay", "flight", "mesh", "map", "place_list"};
 
 constexpr const char* word(RunKind kind) { return kWords[static_cast<std::size_t>(kind)]; }
 
-/// With all that the estimator writes.
+/// Whether the run writes all output files of the estimator.
 constexpr bool isWhole(RunKind kind) { return kind == RunKind::kReplay || kind == RunKind::kFlight; }
 
 bool allDigits(std::string_view text) {
   return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// `prefix` digits `suffix`.
+/// Whether the name is `prefix`, digits, `suffix`.
 bool isNumbered(std::string_view name, std::string_view prefix, std::string_view suffix) {
   return name.size() > prefix.size() + suffix.size() && name.starts_with(prefix) && name.ends_with(suffix) &&
          allDigits(name.substr(prefix.size(), name.size() - prefix.size() - suffix.size()));
@@ -64,7 +64,7 @@ bool isRunFile(const std::string& name, RunKind kind) {
   return (kind == RunKind::kMap ? in(kMapFiles) : in(kRunFiles)) || isNumbered(name, "map_epoch_", ".ply");
 }
 
-/// The first thing of a run's names; empty: none.
+/// The first file with a run's name; empty: none.
 std::string firstRunFile(const fs::path& folder, RunKind kind) {
   std::string first;
   std::error_code error;
@@ -77,7 +77,7 @@ std::string firstRunFile(const fs::path& folder, RunKind kind) {
   return first;
 }
 
-/// Removes the files whose names `ours` knows.
+/// Removes the files for whose names `ours` returns true.
 template <typename Ours>
 void removeFiles(const fs::path& folder, const Ours& ours) {
   std::vector<fs::path> found;
@@ -93,7 +93,7 @@ void removeFiles(const fs::path& folder, const Ours& ours) {
   }
 }
 
-/// A recording that is being read or written belongs to that program.
+/// A recording that is in use belongs to the program that uses it and stays.
 void removeRecording(const fs::path& folder) {
   const int lock = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock < 0) return;
@@ -114,10 +114,10 @@ void removeRecording(const fs::path& folder) {
     throw InputError(folder.string(), 0, "", "another program is writing or reading this recording",
                      "Give another folder with --out, or wait until that program ends");
   }
-  ::rmdir(folder.c_str());  // stays where something else is in it
+  ::rmdir(folder.c_str());  // fails and stays if something else is in it
 }
 
-/// The files of calibration_files.hpp.
+/// Removes the files of calibration_files.hpp.
 void removeCalibration(const fs::path& folder) {
   for (const char* sensor : {"cam0", "cam1", "imu0"}) {
     removeFiles(folder / sensor, [](const std::string& name) { return name == "sensor.yaml"; });
@@ -167,7 +167,7 @@ void refuseOthers(const std::string& folder, RunKind kind) {
                    fmt::format("holds {} but no mark of a {} ({})", file, word(kind), kRunMark), kRemedy);
 }
 
-/// Number of a flight's folder name; none for any other name.
+/// Number in a flight folder's name; empty for any other name.
 std::optional<std::uint32_t> flightNumber(const std::string& name) {
   constexpr std::string_view kTime = "_20261123T160412Z";
   const std::string_view digits = std::string_view(name).substr(0, kNumberDigits);
@@ -208,7 +208,7 @@ bool isClaimed(const fs::path& folder) {
   return claimed;
 }
 
-/// None where the system does not say.
+/// Empty if the system does not tell.
 std::optional<std::uint64_t> freeBytes(const std::string& folder) {
   std::error_code error;
   const fs::space_info space = fs::space(folder, error);
@@ -265,7 +265,7 @@ std::string makeFlightFolder(const std::string& parent, std::time_t now) {
   std::uint32_t number = flights.empty() ? 1 : flights.back().number + 1;
   for (int i = 0; i < kTriesForName && number <= kLargestNumber; ++i, ++number) {
     const std::string folder = fs::path(parent) / flightName(number, now);
-    // Making it is the claim: of two programs that try one name, one is told that it is there.
+    // Creating the folder is the claim: if two programs try the same name, one of them gets EEXIST.
     if (::mkdir(folder.c_str(), 0755) == 0) return folder;
     if (errno != EEXIST) {
       throw InputError(folder, 0, "",

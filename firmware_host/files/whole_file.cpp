@@ -19,14 +19,14 @@ namespace fs = std::filesystem;
                    "Check that the folder exists and is writable and the disk is not full");
 }
 
-/// The file behind a link; the path itself where there is none, or where the link leads nowhere.
+/// Target of a link; the path itself if it is no link, or if the link leads nowhere.
 std::string followed(const std::string& path) {
   std::error_code error;
   const fs::path target = fs::canonical(path, error);
   return error ? path : target.string();
 }
 
-/// A file system that cannot bring folders to the disk is none of the user's concern: the file has its name.
+/// Errors are ignored: some file systems cannot sync folders, and the file already has its name.
 void syncFolderOf(const std::string& path) {
   const fs::path parent = fs::path(path).parent_path();
   const int folder = ::open(parent.empty() ? "." : parent.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -40,7 +40,7 @@ void syncFolderOf(const std::string& path) {
 WholeFile::WholeFile(const std::string& path, Sync sync) : path_(path), target_(followed(path)), sync_(sync) {
   std::error_code error;
   const fs::file_status status = fs::status(target_, error);
-  // A folder is refused here: it would be renamed over only to fail at the end.
+  // Refused here, because renaming over a folder would fail only at the end.
   if (fs::is_directory(status)) failToWrite(path_, EISDIR);
   if (!fs::exists(status) || fs::is_regular_file(status)) part_ = target_ + ".part";
   file_.reset(std::fopen((part_.empty() ? target_ : part_).c_str(), "wbe"));
@@ -67,7 +67,7 @@ void WholeFile::commit() {
   if (std::fflush(file_.get()) != 0) fail(errno);
   const bool sync = sync_ == Sync::kYes && !part_.empty();
   if (sync && ::fsync(::fileno(file_.get())) != 0) fail(errno);
-  // Some file systems (NFS) tell of a full disk only here.
+  // Some file systems (NFS) report a full disk only here.
   if (std::fclose(file_.release()) != 0) fail(errno);
   if (part_.empty()) return;
   if (::rename(part_.c_str(), target_.c_str()) != 0) fail(errno);
