@@ -25,7 +25,7 @@ inline void convexHull(HullPoints& points, HullPoints& hull) {
     const Eigen::Vector2d ap = p.cast<double>() - a;
     return ab.x() * ap.y() - ab.y() * ap.x() > 0;
   };
-  // Along the lower side, then back along the upper side from where the lower ended.
+  // Along the lower side, then back along the upper side from the end of the lower.
   std::size_t begin = 0;
   const auto add = [&](const Eigen::Vector2f& p) {
     while (hull.size() >= begin + 2 && !turns_left(p)) hull.popBack();

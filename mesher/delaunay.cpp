@@ -7,8 +7,8 @@
 namespace swiftlet {
 namespace {
 
-/// Cells a side of the grid whose order along the Hilbert curve build() follows; a power of two. 256 cells:
-/// about one point in each, with the features of one image.
+/// Side length of the grid, in cells, whose Hilbert curve determines the order of insertion in build(); a
+/// power of two. 256 cells hold about one feature of an image each.
 constexpr std::uint32_t kCurveSide = 16;
 
 /// Number of the cell x, y along the Hilbert curve.
@@ -18,7 +18,7 @@ constexpr std::uint32_t hilbertIndex(std::uint32_t x, std::uint32_t y) {
     const std::uint32_t right = (x & side) != 0 ? 1 : 0;
     const std::uint32_t up = (y & side) != 0 ? 1 : 0;
     index += side * side * ((3 * right) ^ up);
-    if (up == 0) {  // turn the quadrant so that its curve begins where the one before ended
+    if (up == 0) {  // rotate the quadrant so that its curve continues the previous one
       if (right == 1) {
         x = kCurveSide - 1 - x;
         y = kCurveSide - 1 - y;
@@ -67,7 +67,7 @@ Status Delaunay::build(std::span<const Eigen::Vector2f> points) {
   skipped_.invalid = static_cast<std::uint32_t>(count - valid);
   skipped_.over_capacity = static_cast<std::uint32_t>(points.size() - count);
   sortAlongCurve(valid);
-  for (std::size_t i = 0; i < valid; ++i) static_cast<void>(place(order_[i]));  // what it skips is counted
+  for (std::size_t i = 0; i < valid; ++i) static_cast<void>(place(order_[i]));  // skipped points are counted
   if (points.size() > count) {
     return {StatusCode::kCapacityReached,
             "more points than the triangulation can hold: the last ones are skipped"};
@@ -76,7 +76,7 @@ Status Delaunay::build(std::span<const Eigen::Vector2f> points) {
   return okStatus();
 }
 
-// Counting sort: stable, hence the lowest index of a duplicate point comes first.
+// Counting sort: stable, so the lowest index of coincident points comes first.
 void Delaunay::sortAlongCurve(std::size_t count) {
   if (count == 0) return;
   GridPoint low = point_[order_[0]];
@@ -86,10 +86,10 @@ void Delaunay::sortAlongCurve(std::size_t count) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y)};
   }
-  // Below kCurveSide however it is rounded, as a step lies beyond the last point.
+  // Less than kCurveSide despite rounding, since the range is one step wider than the points.
   const double scale_x = kCurveSide / (high.x - low.x + 1);
   const double scale_y = kCurveSide / (high.y - low.y + 1);
-  // rank_ and line_ are not in use yet.
+  // rank_ and line_ are not in use yet and serve as scratch.
   std::array<std::uint16_t, kHilbert.size() + 1> start{};
   for (std::size_t i = 0; i < count; ++i) {
     const GridPoint& p = point_[order_[i]];
@@ -116,7 +116,7 @@ Status Delaunay::place(std::uint16_t index) {
   return status;
 }
 
-// Until three vertices span a triangle they are kept in their order on the line; then each is inserted.
+// Until three vertices span a triangle, vertices are kept in their order on the line; then all are inserted.
 Status Delaunay::placeOnLine(std::uint16_t index) {
   const GridPoint& p = point_[index];
   const auto before = [this](std::uint16_t i, const GridPoint& q) { return isBefore(point_[i], q); };
@@ -127,7 +127,7 @@ Status Delaunay::placeOnLine(std::uint16_t index) {
   }
   if (line_.size() >= 2 && orientation(point_[line_[0]], point_[line_[1]], p) != 0) {
     startWith(line_[0], line_[1], index);
-    // Each lies beyond the one before, outside the hull: no walk is longer than two steps.
+    // Each point lies beyond the previous one, outside the hull: no walk is longer than two steps.
     for (std::size_t i = 2; i < line_.size(); ++i) static_cast<void>(placeInPlane(line_[i]));
     line_.clear();
     return okStatus();
@@ -148,8 +148,8 @@ void Delaunay::startWith(std::uint16_t a, std::uint16_t b, std::uint16_t c) {
   for (Edge side = 0; side < 3; ++side) {
     const auto beyond = static_cast<Edge>(4 + 4 * side);
     join(side, beyond);
-    // Counter-clockwise along the hull, the edge from infinity is the one to infinity of the next infinite
-    // cell.
+    // Counter-clockwise along the hull: a cell's edge from infinity is the twin of the next infinite cell's
+    // edge to infinity.
     join(static_cast<Edge>(beyond + 2), static_cast<Edge>(4 + 4 * nextOf(side) + 1));
   }
   last_ = 0;
@@ -169,8 +169,9 @@ Status Delaunay::placeInPlane(std::uint16_t index) {
   return okStatus();
 }
 
-// The triangle that p is in or on the border of, or an infinite one whose edge p is strictly outside of. No
-// triangle is entered twice, for along the walk the power of p to the circumcircles falls; hence the limit.
+// Finds the triangle that contains p (border included), or an infinite one whose edge p is strictly outside
+// of. No triangle is entered twice, because the power of p with respect to the circumcircles decreases along
+// the walk; hence the limit.
 bool Delaunay::locate(const GridPoint& p, Edge& cell) const {
   const auto arm_to = [&](Edge edge) { return armOf(p, point_[origin_[edge]]); };
   const auto is_beyond = [](const GridArm& from, const GridArm& to) {
@@ -201,9 +202,9 @@ bool Delaunay::locate(const GridPoint& p, Edge& cell) const {
   return false;
 }
 
-// Three triangles for one; p is the last vertex of each, as flips keep it. If p is on the edge opposite to
-// it, that triangle is flat until flipAround() flips the edge, which it does as p is inside the circle
-// beyond.
+// Replaces a triangle by three; p is the last vertex of each, and flips keep it so. If p is on the edge
+// opposite to it, that triangle is flat until flipAround() flips the edge, which it does because p is inside
+// the circle beyond.
 void Delaunay::split(Edge cell, std::uint16_t p) {
   const auto second = static_cast<Edge>(4 * cell_count_);
   const auto third = static_cast<Edge>(second + 4);
@@ -224,8 +225,8 @@ void Delaunay::split(Edge cell, std::uint16_t p) {
   join_fan(third, cell);
 }
 
-// Counter-clockwise around p, beginning at `cell`. Every flip gives p one more neighbour, every other step
-// passes one of them, and p has no more neighbours than there are vertices (the infinite one included): hence
+// Goes counter-clockwise around p, beginning at `cell`. Every flip gives p one more neighbour, every other
+// step passes one, and p has no more neighbours than there are vertices (the infinite one included); hence
 // the limit.
 void Delaunay::flipAround(Edge cell, std::uint16_t p) {
   const GridPoint centre = point_[p];
@@ -249,23 +250,24 @@ void Delaunay::flipAround(Edge cell, std::uint16_t p) {
   }
 }
 
-// Is the edge, from a to b opposite to p, to be replaced by p d, with d beyond? For what the filter cannot
-// decide.
+// Whether to replace the edge from a to b, opposite to p, by the edge p d, with d beyond. Called if the
+// filter cannot decide.
 bool Delaunay::mustFlipUndecided(Edge edge, std::uint16_t p, std::uint16_t d) const {
   const std::uint16_t a = origin_[edge];
   const std::uint16_t b = origin_[nextOf(edge)];
-  // Is the hull's edge b d (d a) seen from p? In line with p it is not: its ends stay on the hull.
+  // Whether p sees the hull's edge b d (d a). If p is in line with it, it does not: the edge's ends stay on
+  // the hull.
   if (a == kInfinite) return orientation(point_[d], point_[b], point_[p]) > 0;
   if (b == kInfinite) return orientation(point_[a], point_[d], point_[p]) > 0;
   // p is inside the hull or, if the triangle is flat, on its edge.
   if (d == kInfinite) return orientation(point_[a], point_[b], point_[p]) == 0;
   const int side = inCircle(point_[b], point_[a], point_[d], point_[p]);
   if (side != 0) return side > 0;
-  // On one circle: the diagonal avoids the last of the four in their order.
+  // All on one circle: the diagonal avoids the last of the four points in their order.
   return isBefore(std::max(point_[p], point_[d], isBefore), std::max(point_[a], point_[b], isBefore));
 }
 
-// The edge opposite to p, from a to b, becomes the edge from p to the vertex d beyond.
+// Replaces the edge opposite to p, from a to b, by the edge from p to the vertex d beyond.
 void Delaunay::flip(Edge edge, std::uint16_t p) {
   const Edge twin = twin_[edge];
   const Edge other = firstOf(twin);
@@ -316,8 +318,8 @@ void Delaunay::collect() {
   if (cell_count_ > 0) collectHull(edgeFromInfinite(infinite_cell));
 }
 
-// Around the infinite vertex. The infinite cell beyond the hull's edge from s to e is e, s, infinite; the
-// next one is beyond its edge from infinity to e.
+// Goes around the infinite vertex. The infinite cell beyond the hull's edge from s to e is e, s, infinite;
+// the next one is beyond its edge from infinity to e.
 void Delaunay::collectHull(Edge from_infinite) {
   Edge at = from_infinite;
   for (std::size_t i = 0; i < vertex_count_; ++i) {

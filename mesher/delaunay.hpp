@@ -37,7 +37,7 @@ inline constexpr std::size_t kMaxDelaunayPoints = kMaxMeshVertices;
 inline constexpr std::size_t kMaxDelaunayTriangles = 2 * kMaxDelaunayPoints - 5;
 
 struct DelaunayTriangle {
-  /// No triangle beyond this edge: the outside.
+  /// No triangle beyond this edge.
   static constexpr std::uint16_t kNoNeighbour = 0xFFFF;
 
   std::array<std::uint16_t, 3> vertex{};  ///< indices of the points, counter-clockwise

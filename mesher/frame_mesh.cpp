@@ -9,19 +9,19 @@ namespace {
 
 constexpr float kMinHeight = 2.0F;  // px
 constexpr float kMaxRelativeSigma = 0.1F;
-// A diagonal is turned where that makes its ends differ less by this in the logarithm of the distance: less
-// is noise.
+// A diagonal is flipped only if the logarithms of its ends' distances then differ less by this amount;
+// smaller gains are noise.
 constexpr float kLeastGain = 0.1F;
-// Geometric mean of how far a face reaches along the line of sight and of what its neighbours disagree with
-// it, both relative to the distance. In a rendered hall and a rendered room faces up to here are off by 1.15
-// and 1.33 % of their distance; a larger limit draws more, with larger errors.
+// Largest tear: geometric mean of a face's extent along the line of sight and of its neighbours' disagreement
+// with it, both relative to the distance. In a rendered hall and a rendered room, faces up to this limit are
+// off by 1.15 and 1.33 % of their distance; a larger limit draws more faces, with larger errors.
 constexpr float kMaxTear = 0.12F;
-// Of what lies on the plane's other side.
+// Disagreement of a point on the other side of the camera's parallel to the plane.
 constexpr float kMostDisagreement = 1.0F;
-// 14 degrees. Walls and floors of a room are seen at more nearly everywhere.
+// Sine of 14 degrees. Walls and floors of a room are nearly always seen at larger angles.
 constexpr float kMinSineToSight = 0.25F;
 
-// Places in a face at which the label image is read: spread, away from the edges.
+// Positions in a face at which the label image is read: spread, away from the edges.
 struct Barycentric {
   float a, b, c;
 };
@@ -49,13 +49,13 @@ FaceVerdict FrameMesh::judge(std::size_t index) const {
   const float longest_px =
       std::sqrt(std::max({ab.squaredNorm(), ac.squaredNorm(), (b.pixel - c.pixel).squaredNorm()}));
   if (twice_area < kMinHeight * longest_px) return FaceVerdict::kThin;
-  // What is not a number is no surface.
+  // NaN does not pass as a surface.
   return tear(index) <= kMaxTear ? FaceVerdict::kKept : FaceVerdict::kTorn;
 }
 
-// A surface goes on beyond a face's edges: what lies on two sides of it tells whether it is one. Between the
-// straight edge of a thing and a wall behind it the faces are all in one plane, but nearly along the line of
-// sight: there what lies on the third side must agree too.
+// A surface continues beyond a face's edges: the points beyond two of them tell whether the face is on one.
+// Between the straight edge of an object and the wall behind it, faces all lie in one plane but nearly along
+// the line of sight: there the point beyond the third edge must agree too.
 float FrameMesh::tear(std::size_t index) const {
   const DelaunayTriangle& triangle = triangles_[index];
   const auto& vertex = triangle.vertex;
@@ -88,9 +88,8 @@ std::uint16_t FrameMesh::apexBeyond(std::size_t index, std::size_t edge) const {
   return triangles_[beyond].vertex[(edgeTowards(beyond, index) + 2) % 3];
 }
 
-// Delaunay's triangles know nothing of depth. Where two of them could as well be joined along the other
-// diagonal, the one is taken whose ends are at more equal distances: along the edge of a thing, not from it
-// to what is behind.
+// Delaunay triangulation ignores depth. Of the two possible diagonals of two triangles, the one is taken
+// whose ends are at more similar distances: along the edge of an object, not from it to the background.
 void FrameMesh::alignWithDepth() {
   const auto twiceArea = [this](std::uint16_t a, std::uint16_t b, std::uint16_t c) {
     const Eigen::Vector2f ab = pixels_[b] - pixels_[a];
@@ -139,7 +138,7 @@ void FrameMesh::turnDiagonal(std::size_t index, std::size_t edge) {
   far = {{d, b, c}, {past_db, past_bc, self}};
 }
 
-// A face across a border between labels is of neither.
+// A face across a border between labels has none.
 std::uint8_t FrameMesh::labelOf(const FrameFace& face, const ImageView& labels) const {
   std::uint8_t label = kNoLabel;
   for (const Barycentric& place : kLabelPlaces) {
@@ -171,7 +170,7 @@ void FrameMesh::build(const Points& points, const ImageView& labels) {
   for (std::size_t i = 0; i < triangles_.size(); ++i) {
     const DelaunayTriangle& triangle = triangles_[i];
     FrameFace face;
-    // y points down in the image: what is counter-clockwise in its axes is clockwise to the eye.
+    // y points down in the image: counter-clockwise in its axes looks clockwise.
     face.point = {triangle.vertex[0], triangle.vertex[2], triangle.vertex[1]};
     face.verdict = judge(i);
     if (!labels.empty()) face.label = labelOf(face, labels);

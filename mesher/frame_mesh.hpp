@@ -8,9 +8,8 @@
 // following rules, which do not depend on the size of the scene (docs/mesher.md):
 //  - unknown: the distance of a vertex is uncertain by more than a tenth (1 sigma);
 //  - thin: the smallest height in the image is below 2 px;
-//  - torn: the face extends far along the line of sight, and its neighbours are not in its plane (two of
-//  them,
-//    or all if it is seen at less than 14 degrees), so it spans two surfaces.
+//  - torn: the face extends far along the line of sight, and its neighbours are not in its plane (two
+//    of them, or all if it is seen at less than 14 degrees), so it spans two surfaces.
 // A face has a label if all of seven samples in it show that label; across a border between labels it has
 // none.
 // Frames: camera 0, metres; raw pixels. Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
@@ -52,7 +51,7 @@ class FrameMesh {
   using Points = FixedVector<FramePoint, kMaxFeatures>;
   using Faces = FixedVector<FrameFace, 2 * kMaxFeatures>;
 
-  /// `points`: finite, ids unique. `labels`: in the features' raw geometry, or empty. Gives no faces with
+  /// `points`: finite, unique ids. `labels`: in the features' raw geometry, or empty. There are no faces with
   /// fewer than three points or if all are collinear.
   void build(const Points& points, const ImageView& labels);
 

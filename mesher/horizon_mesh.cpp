@@ -7,16 +7,16 @@ namespace swiftlet {
 namespace {
 
 constexpr std::uint32_t kNone = TripletTable::kNone;
-// A landmark is seen through a face when it lies behind it by this share of its distance, by this length and
-// by this many sigmas of its own. The first two allow for faces that cut off the curve of a surface.
+// A landmark is seen through a face if it lies behind the face by more than this share of its distance, this
+// length and this many sigmas. The first two allow for faces that cut the corner of a curved surface.
 constexpr float kBehindShare = 0.05F;
 constexpr float kBehind = 0.05F;  // m
 constexpr float kBehindSigmas = 3.0F;
-// What is nearer to the camera's centre does not project well [m].
+// Points nearer to the camera's centre do not project well [m].
 constexpr double kMinDistance = 0.1;
-// A face whose landmarks have moved apart by this is not the one that was seen.
+// If a face's longest edge has grown by this factor, its landmarks no longer form the surface that was seen.
 constexpr float kMaxGrowth = 1.5F;
-// Labels: so many sightings in a row of another label change a face's.
+// Most votes of a label: this many consecutive observations of another label change a face's label.
 constexpr std::uint8_t kMaxVotes = 8;
 
 }  // namespace
@@ -47,7 +47,7 @@ void HorizonMesh::update(const FrameMesh& frame, const LandmarkLookup& landmarks
   addFaces(frame);
 }
 
-/// Old vertices that stay and the frame's new ones, in order of ids.
+/// Merges remaining old vertices and the frame's new ones, ordered by id.
 void HorizonMesh::mergeVertices(const FrameMesh& frame, const LandmarkLookup& landmarks) {
   const FrameMesh::Points& points = frame.points();
   in_kept_face_.fill(false);
@@ -101,7 +101,7 @@ void HorizonMesh::renumberFaces() {
   faces_.resize(kept);
 }
 
-/// Which vertex each of the frame's points is, and the other way about; the frame's triangles by their
+/// Relates vertices and the frame's points in both directions, and collects the frame's triangles by their
 /// points.
 void HorizonMesh::joinFrame(const FrameMesh& frame) {
   point_of_.assign(vertices_.size(), kNone);
@@ -131,7 +131,7 @@ void HorizonMesh::project(const CameraModel& camera, const SE3& T_cam_world) {
   }
 }
 
-/// Takes out the old faces that the frame contradicts.
+/// Removes old faces that the frame contradicts.
 void HorizonMesh::review(const FrameMesh& frame) {
   std::size_t kept = 0;
   for (const Face& face : faces_) {
@@ -186,7 +186,7 @@ void HorizonMesh::addFaces(const FrameMesh& frame) {
   }
 }
 
-/// One of the frame's landmarks lies behind the face, on a line of sight that the face is in.
+/// Whether a landmark of the frame lies behind the face, on a line of sight through it.
 bool HorizonMesh::seenThrough(const Face& face, const FrameMesh& frame) const {
   const Projected& a = projected_[face.vertex[0]];
   const Projected& b = projected_[face.vertex[1]];

@@ -27,7 +27,7 @@ namespace swiftlet {
 struct HorizonLimits {
   std::size_t vertices = kMaxMeshVertices;
   std::size_t faces = kMaxMeshFaces;
-  bool keep_all = false;  ///< keep vertices whose landmarks left the window
+  bool keep_all = false;  ///< keep vertices whose landmarks have left the window
 };
 
 struct HorizonCounters {
@@ -76,12 +76,12 @@ class HorizonMesh {
   HorizonLimits limits_;
   std::vector<MeshVertex> vertices_, merged_;
   std::vector<Face> faces_;
-  TripletTable known_;                    ///< faces_ by their vertices
+  TripletTable known_;                    ///< index of faces_ by their vertices
   std::vector<std::uint32_t> new_index_;  ///< of each old vertex
   std::vector<std::uint8_t> referenced_;  ///< of each vertex: 1 if a face uses it
   std::vector<Projected> projected_;
-  // Of the frame.
-  TripletTable joined_;  ///< its triangles, kept or not, by their points
+  // Data of the current frame.
+  TripletTable joined_;  ///< all its triangles, kept or not, by their points
   FixedVector<std::uint16_t, kMaxFeatures> by_id_;
   std::array<bool, kMaxFeatures> in_kept_face_{};
   std::array<std::uint32_t, kMaxFeatures> vertex_of_{};

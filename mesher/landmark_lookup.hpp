@@ -1,5 +1,5 @@
 #pragma once
-// Look-up of the window's landmarks by id.
+// Finds landmarks of the window by id.
 
 #include <algorithm>
 
@@ -9,8 +9,8 @@ namespace swiftlet {
 
 class LandmarkLookup {
  public:
-  /// Takes landmarks with a finite position; of equal ids the first. Refers to `window` until the next
-  /// fill(). Returns the number left out. Cost: a sort of 1024 ids, 50 us.
+  /// Takes the landmarks with finite positions; of equal ids the first. Refers to `window` until the next
+  /// fill(). Returns the number of landmarks omitted. Cost: a sort of 1024 ids, 50 us.
   int fill(const SmoothedWindow& window) {
     entries_.clear();
     int left_out = 0;
@@ -21,7 +21,7 @@ class LandmarkLookup {
         ++left_out;
       }
     }
-    // Addresses break ties, so that the first in the window wins.
+    // Addresses break ties, so that the first one in the window is found.
     std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
       return a.id != b.id ? a.id < b.id : a.landmark < b.landmark;
     });

@@ -9,7 +9,8 @@
 namespace swiftlet {
 namespace {
 
-// A vehicle does not move further between two frames than at this speed, and this: the estimate has jumped.
+// If the vehicle moves between two frames by more than this speed allows and by more than this distance, the
+// estimate has jumped.
 constexpr double kMaxSpeed = 50;  // m/s
 constexpr double kMaxStep = 0.5;  // m
 
@@ -84,7 +85,7 @@ Status MeshStage::check(const MeshInput& input) {
   return okStatus();
 }
 
-/// The frame's features, for the hull; and those with a landmark, lifted.
+/// Collects the frame's features for the hull, and lifts those with a landmark.
 void MeshStage::lift(const MeshInput& input) {
   points_.clear();
   features_.clear();
@@ -145,7 +146,7 @@ void MeshStage::findPlanes(const MeshInput& input) {
   copyHorizon(planes_->horizon);
   copyFrame(planes_->frame);
   if (input.tracks->keyframe) {
-    // What the finder refuses leaves its report empty, and is in its counters.
+    // If the finder refuses its input, its report is empty and its counters record it.
     looked_ = planes_->finder.step(planes_->horizon, window, report).ok();
   }
   for (LocalMesh* mesh : {&planes_->horizon, &planes_->frame}) {

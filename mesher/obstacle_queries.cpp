@@ -15,7 +15,7 @@ namespace {
 // A triangle cut by six half-spaces has nine corners at most.
 using Polygon = FixedVector<Eigen::Vector3f, 9>;
 
-/// Keeps what has normal . p <= limit.
+/// Keeps the part of the polygon with normal . p <= limit.
 void cut(const Polygon& polygon, const Eigen::Vector3f& normal, float limit, Polygon& out) {
   out.clear();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -30,9 +30,9 @@ void cut(const Polygon& polygon, const Eigen::Vector3f& normal, float limit, Pol
   }
 }
 
-/// Of the convex polygon, nearest to the origin.
+/// Point of the convex polygon that is nearest to the origin.
 Eigen::Vector3f nearestToOrigin(const Polygon& polygon, const Eigen::Vector3f& normal) {
-  // The foot of the perpendicular, if it lies inside all edges.
+  // The foot of the perpendicular, if it lies inside the polygon.
   const float square = normal.squaredNorm();
   if (square > 0) {
     const Eigen::Vector3f foot = normal * (normal.dot(polygon[0]) / square);
@@ -56,7 +56,7 @@ Eigen::Vector3f nearestToOrigin(const Polygon& polygon, const Eigen::Vector3f& n
 
 constexpr float kSectorWidth = 2 * std::numbers::pi_v<float> / static_cast<float>(kObstacleSectors);
 
-/// Horizontal distance from the origin to the convex polygon, which does not lie around it.
+/// Horizontal distance from the origin to the convex polygon, which must not surround it.
 float horizontalDistance(const Polygon& polygon) {
   float best = kNothingKnown;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -69,7 +69,7 @@ float horizontalDistance(const Polygon& polygon) {
   return best;
 }
 
-/// The azimuths that a polygon covers, from x to y, in sectors; `around` where it surrounds the origin.
+/// Sectors of azimuth, from x to y, that a polygon covers; `around` if it surrounds the origin.
 struct Azimuths {
   int first = 0;
   int last = -1;
@@ -89,14 +89,14 @@ Azimuths azimuthsOf(const Polygon& polygon) {
     high = std::max(high, angle);
   }
   Azimuths azimuths;
-  // All the way round in one direction, not there and back.
+  // A whole turn in one direction, not back and forth.
   azimuths.around = std::abs(angle) > std::numbers::pi_v<float>;
   azimuths.first = static_cast<int>(std::floor((begin + low) / kSectorWidth + 0.5F));
   azimuths.last = static_cast<int>(std::floor((begin + high) / kSectorWidth + 0.5F));
   return azimuths;
 }
 
-/// What the polygon has in the sectors that it crosses.
+/// Updates the distances in the sectors that the polygon crosses.
 void addToSectors(const Polygon& polygon, SectorDistances& nearest) {
   const Azimuths azimuths = azimuthsOf(polygon);
   if (azimuths.around) {

@@ -8,9 +8,9 @@
 namespace swiftlet {
 namespace {
 
-// Across the line of sight: a pixel or so.
+// Standard deviation across the line of sight: about one pixel.
 constexpr double kLateralSigma = 0.002;  // of the depth
-// A plane moves a little between the keyframe of the report and the solve that it is drawn with.
+// A plane moves slightly between the report's keyframe and the solve with which it is drawn.
 constexpr double kMaxSigmas = 4;
 constexpr double kLeastGate = 0.05;  // m
 

@@ -1,11 +1,11 @@
 #pragma once
 // Flattens a mesh onto known planes: moves vertices towards their planes according to their noise,
 //   p' = p - S n (n . p - d) / (n^T S n + surface_sigma^2),   S = depth_sigma^2 u u^T + lateral_sigma^2 I,
-// with u the line of sight: the most likely position of a point seen in that direction and on that plane.
-// Well-known vertices hardly move. Poorly known ones move onto the plane along their line of sight, so that
-// their position in the image stays. Landmarks that the smoother already tied to the plane hardly move.
-// The plane is the smoother's if it has one (SmoothedWindow::planes), otherwise the mesher's.
-// No allocation (40 kB on the stack). Cost: two sorts, and a search per vertex; 0.1 ms.
+// with u the line of sight: the most likely position of a point that was seen in that direction and lies on
+// that plane. Accurate vertices hardly move. Inaccurate ones move onto the plane along their line of sight,
+// so that their position in the image stays. Landmarks that the smoother already tied to the plane hardly
+// move. The plane is the smoother's if it has one (SmoothedWindow::planes), otherwise the mesher's. No
+// allocation (40 kB on the stack). Cost: two sorts, and a search per vertex; 0.1 ms.
 
 #include <Eigen/Core>
 #include <cstdint>

@@ -7,9 +7,9 @@
 namespace swiftlet {
 namespace {
 
-// A face of less is a line to single precision at some metres' distance.
+// A smaller face is a line in single precision at some metres' distance.
 constexpr float kMinArea = 1e-6F;  // m^2
-// A vertex that is no landmark of the window (any more): as a point whose depth is known to 5 %.
+// Assumed for a vertex that is not or no longer a landmark of the window: 5 % of the depth.
 constexpr float kUnknownRelativeSigma = 0.05F;
 
 }  // namespace

@@ -6,49 +6,48 @@
 namespace swiftlet {
 namespace {
 
-// What a plane must show in every keyframe until it is reported.
+// Requirements for a plane at every keyframe until it is reported.
 constexpr int kNewPoints = 10;
 constexpr int kNewKnown = 8;      // of them, known well enough to tell the wall from a shelf in front of it
-constexpr float kNewArea = 0.5F;  // m^2: a table; less is the side of a box
-constexpr float kNewNarrow = 0.12F;     // m, 1 sigma: some 40 cm across at its narrowest
-constexpr float kNewShare = 0.6F;       // of the points around it; a cloud gives a quarter, two surfaces half
-constexpr float kMaxChiSquared = 2;     // 1 is expected; sigmas are those of a linear solve
-constexpr float kMaxRms = 0.03F;        // m; even scatter in the gate has 0.029
-constexpr float kNewTurnSigma = 0.02F;  // rad: a narrow wall turns as its noise likes
+constexpr float kNewArea = 0.5F;  // m^2: a table; less may be the side of a box
+constexpr float kNewNarrow = 0.12F;     // m, 1 sigma: some 40 cm wide at its narrowest
+constexpr float kNewShare = 0.6F;       // of the points around it; a cloud gives 0.25, two surfaces 0.5
+constexpr float kMaxChiSquared = 2;     // 1 is expected, with sigmas from a linear solve
+constexpr float kMaxRms = 0.03F;        // m; points spread evenly in the gate give 0.029
+constexpr float kNewTurnSigma = 0.02F;  // rad: a narrow wall's azimuth is dominated by noise
 constexpr int kProofKeyframes = 4;      // a second or more of flight: other landmarks, another view
-// And what keeps a plane that is known.
+// Requirements to keep a known plane.
 constexpr int kKeptPoints = 4;
 constexpr float kKeptArea = 0.15F;  // m^2
 constexpr float kKeptShare = 0.4F;
 constexpr float kKeptTurnSigma = 0.05F;  // rad
 constexpr int kKeptSilent = 120;         // keyframes: half a minute of looking elsewhere
-constexpr int kUnprovenSilent = 2;       // keyframes, before it is reported
-// A wall's azimuth over keyframes. Neighbouring ones share most of their points, some five each.
+constexpr int kUnprovenSilent = 2;       // keyframes, for a plane that is not reported yet
+// Filter of a wall's azimuth over keyframes. A point is shared by some five successive keyframes.
 constexpr double kSharedKeyframes = 5;
-constexpr double kTurnDrift = 0.001;     // rad a keyframe: the estimate's yaw
+constexpr double kTurnDrift = 0.001;     // rad per keyframe: drift of the estimate's yaw
 constexpr double kTurnGate = 3;          // sigmas
-constexpr double kMostTurnSigma = 0.02;  // rad, of what is reported
-// The estimate moves under a plane by millimetres a keyframe; more is another surface.
+constexpr double kMostTurnSigma = 0.02;  // rad, for reported planes
+// A plane appears to move by millimetres per keyframe, with the estimate; a larger move is another surface.
 constexpr double kSameDistance = 0.08;       // m, at the other's points
-constexpr double kSameCosine = 0.985;        // 10 degrees: a narrow wall's azimuth, badly known
-constexpr double kDuplicateDistance = 0.04;  // m: below the gate, one's points are the other's
-// Votes below this are no surface [m^2]: a fifth of a new plane's area lies in its strongest bin at the
-// least.
+constexpr double kSameCosine = 0.985;        // 10 degrees: a narrow wall's azimuth is inaccurate
+constexpr double kDuplicateDistance = 0.04;  // m: less than the gate, so both planes have the same points
+// Fewer votes are no surface [m^2]: the strongest bin of a new plane holds at least a fifth of its area.
 constexpr float kLeastVotes = 0.2F * kNewArea;
-constexpr int kMaxTries = 24;  // of guesses a keyframe: bounded work
+constexpr int kMaxTries = 24;  // guesses per keyframe, to bound the work
 
-// A landmark's way onto a plane and off again.
+// Associating a landmark with a plane, and ending the association.
 constexpr float kOnSigmas = 2.5F;
 constexpr float kOnGate = 0.035F;  // m
 constexpr float kOffSigmas = 3.5F;
 constexpr int kAgreeKeyframes = 2;
 constexpr int kWithoutFaces = 3;  // keyframes: the triangulation changes, the landmark does not
-constexpr int kFewestShare = 3;   // at least one in so many of the faces around it: an edge has half
-// From faces with two corners on a plane to the third.
+constexpr int kFewestShare = 3;   // at least 1/3 of the faces around it; at an edge it is half
+// Spreading from faces with two corners on a plane to the third corner.
 constexpr float kSpreadSigmas = 3.5F;
-constexpr float kSpreadGate = 0.5F;  // m: what stands so far in front of a wall is a thing of its own
-constexpr int kSpreadRounds = 5;     // faces away from points that are on it for certain
-constexpr int kReportedBonus = 10;   // points by which a newcomer must lead to take a reported plane's place
+constexpr float kSpreadGate = 0.5F;  // m: what is this far in front of a wall is a separate object
+constexpr int kSpreadRounds = 5;     // most faces between a vertex and certain points of the plane
+constexpr int kReportedBonus = 10;   // points by which a new plane must lead to replace a reported one
 
 bool proves(const PlaneSupport& s) {
   return s.points >= kNewPoints && s.known >= kNewKnown && s.area >= kNewArea && s.narrow >= kNewNarrow &&
@@ -114,13 +113,13 @@ void PlaneFinder::followKnown(const LocalMesh& mesh) {
   }
 }
 
-// Of the plane that was fitted last.
+// For the plane that was fitted last.
 bool PlaneFinder::provesItself() {
   return proves(fit_.support()) && fit_.narrowOfLargerPart(facts_) >= kNewNarrow;
 }
 
-// A wall at the edge of the view turns as its last points like: the azimuth is filtered. False when it has
-// turned into something else.
+// Filters the azimuth: at the edge of the view, a wall's direction depends on its last points. False: the
+// plane has turned into something else.
 bool PlaneFinder::blend(const Followed& plane, PlaneGuess& guess, double& turn_variance) const {
   if (guess.direction == PlaneDirection::kHorizontal) return true;
   const Eigen::Vector3d before = plane.normal;
@@ -136,7 +135,7 @@ bool PlaneFinder::blend(const Followed& plane, PlaneGuess& guess, double& turn_v
   const double s = std::sin(gain * turn);
   const Eigen::Vector3f normal =
       Eigen::Vector3d(c * before.x() - s * before.y(), s * before.x() + c * before.y(), 0).cast<float>();
-  // Turned about its points.
+  // Rotate about the centre of its points.
   guess.distance += (normal - guess.normal).dot(fit_.support().centre);
   guess.normal = normal;
   return true;
@@ -175,7 +174,8 @@ void PlaneFinder::findNew(const LocalMesh& mesh) {
   }
 }
 
-// The followed plane that a fitted one is, which may be the one it came from; their number when it is new.
+// Index of the followed plane that matches the fitted one (possibly the one it came from); the number of
+// followed planes if it is new.
 std::size_t PlaneFinder::slotFor(const PlaneGuess& guess) {
   const Eigen::Vector3d normal = guess.normal.cast<double>();
   const Eigen::Vector3d centre = facts_.viewer + fit_.support().centre.cast<double>();
@@ -185,7 +185,7 @@ std::size_t PlaneFinder::slotFor(const PlaneGuess& guess) {
   for (std::size_t i = 0; i < followed_.size(); ++i) {
     const Followed& plane = followed_[i];
     if (plane.direction != guess.direction || plane.normal.dot(normal) < kSameCosine) continue;
-    // At both places where something was seen of them; a small turn about one moves the other's far end.
+    // Compared at the points of both planes, because a small turn about one moves the other's far end.
     const double here = std::abs(plane.normal.dot(centre) - plane.distance);
     const double there = std::abs(normal.dot(plane.centre) - distance);
     if (std::max(here, 0.5 * there) >= nearest) continue;
@@ -213,7 +213,7 @@ void PlaneFinder::accept(const LocalMesh& mesh, const PlaneGuess& guess, std::si
       Owner& o = owners_[v];
       if (o.plane_faces < 255) ++o.plane_faces;
       if (o.plane == owner) continue;
-      // Where two planes meet: the nearer.
+      // Where two planes meet, the nearer one.
       if (o.plane == kNone || std::abs(heightOf(plane, facts_.vertices[v])) <
                                   std::abs(heightOf(followed_[o.plane], facts_.vertices[v]))) {
         o.plane = owner;
@@ -233,7 +233,7 @@ PlaneFinder::Followed* PlaneFinder::find(std::uint64_t id) {
   return nullptr;
 }
 
-// The one followed for longer stays.
+// The plane followed for longer stays.
 void PlaneFinder::mergeDuplicates() {
   for (std::size_t i = 0; i < followed_.size(); ++i) {
     for (std::size_t k = followed_.size(); k-- > i + 1;) {
@@ -267,7 +267,7 @@ void PlaneFinder::remove(std::size_t index) {
   followed_.erase(index);
 }
 
-// Room for a new one: the plane not seen for longest goes. False when all are in sight.
+// Makes room for a new plane by removing the one not seen for longest. False if all are in sight.
 bool PlaneFinder::forgetOne() {
   const auto* oldest =
       std::max_element(followed_.begin(), followed_.end(),
@@ -307,7 +307,7 @@ void PlaneFinder::associate(const LocalMesh& mesh) {
     static_cast<void>(associations_.tryPushBack(association));
   }
   std::sort(associations_.begin(), associations_.end(), by_id);
-  // A mesh may name a landmark twice.
+  // A mesh may contain a landmark twice.
   const auto end = std::unique(associations_.begin(), associations_.end(),
                                [](const Association& a, const Association& b) { return a.id == b.id; });
   associations_.resize(static_cast<std::size_t>(end - associations_.begin()));
@@ -361,7 +361,7 @@ void PlaneFinder::write(const LocalMesh& mesh, PlaneReport& report) {
     plane.reported = true;
     static_cast<void>(report.planes.tryPushBack({plane.id, plane.direction, plane.normal, plane.distance}));
   }
-  // Those of reported planes, in the scratch of the step before.
+  // Associations with reported planes, in a buffer that is free here.
   associations_before_.clear();
   for (std::size_t v = 0; v < facts_.vertices.size(); ++v) owners_[v].plane = kNone;
   for (const Association& association : associations_) {
@@ -382,7 +382,7 @@ void PlaneFinder::write(const LocalMesh& mesh, PlaneReport& report) {
   }
 }
 
-// Over vertices that are known badly, from faces with two corners on a plane.
+// Adds inaccurate vertices of faces that have two corners on a plane.
 void PlaneFinder::spreadOver(const LocalMesh& mesh) {
   const auto by_id = [](const Association& a, TrackId id) { return a.id < id; };
   const Association* begin = associations_before_.begin();

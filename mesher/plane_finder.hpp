@@ -54,7 +54,7 @@ class PlaneFinder {
   void reset();
 
  private:
-  /// More than are reported, because planes are followed before they are reported.
+  /// More than are reported, because planes are followed first.
   static constexpr std::size_t kMaxFollowed = 2 * kMaxPlanes;
   static constexpr std::uint8_t kNone = 255;
 

@@ -8,22 +8,24 @@
 namespace swiftlet {
 namespace {
 
-// A face with edges of 30 cm and corners off by 3 cm (1 sigma) is off by 8 degrees; many are thinner.
+// A face with edges of 30 cm and corners off by 3 cm (1 sigma) is tilted by 8 degrees; many faces are
+// thinner.
 constexpr float kFaceCosine = 0.866F;  // 30 degrees
-// The votes' bins are 5 cm and 3 degrees wide: the first gate must hold a wall that lies between two.
+// The votes' bins are 5 cm and 3 degrees wide: the first gate must include a wall between two bins.
 constexpr std::array<float, 3> kGates{0.10F, 0.07F, kPlaneGate};  // m
 constexpr float kGateSigmas = 3;
-constexpr int kLeastPoints = 4;  // of a line in the plan: two more than determine it
-// Around a surface there is air or furniture: in a cloud, a gate of 5 cm holds a quarter of this slab.
+constexpr int kLeastPoints = 4;  // points of a line in the plan: two more than needed
+// Half thickness of the slab in which the share is measured. Around a surface there is air or furniture; in a
+// cloud, a gate of 5 cm holds a quarter of the slab.
 constexpr float kSlab = 0.20F;  // m
-// Standard deviations of the points in the plane within which vertices are asked: an even spread ends at 1.7.
+// Extent of the plane in standard deviations of its points; evenly spread points end at 1.7.
 constexpr float kExtentSigmas = 2;
 
-// Points fall apart where the widest gap between neighbours exceeds so many standard deviations: twenty that
-// are spread evenly do so in one of thirty cases.
+// Points form two parts if the widest gap between neighbours exceeds this many standard deviations. For
+// twenty evenly spread points this happens in one of thirty cases.
 constexpr float kGapSigmas = 1;
 
-constexpr double kLeastSpread = 1e-6;  // m^2, of points on one vertical line
+constexpr double kLeastSpread = 1e-6;  // m^2, for points on one vertical line
 
 float height(const PlaneGuess& plane, const Eigen::Vector3f& p) {
   return plane.normal.dot(p) - plane.distance;
@@ -37,7 +39,7 @@ float normalSigma(const VertexFacts& vertex, const Eigen::Vector3f& normal) {
 
 void PlaneFit::collect(const LocalMesh& mesh, const MeshFacts& facts, const PlaneGuess& plane, float gate,
                        bool by_noise) {
-  // 1: within the gate; 2: and of a face that lies in the plane.
+  // 1: within the gate; 2: also a corner of a face in the plane.
   for (std::size_t v = 0; v < facts.vertices.size(); ++v) {
     const VertexFacts& vertex = facts.vertices[v];
     vertex_in_[v] = 0;
@@ -95,10 +97,10 @@ bool PlaneFit::solve(const MeshFacts& facts, PlaneGuess& plane) {
 bool PlaneFit::refine(const LocalMesh& mesh, const MeshFacts& facts, PlaneGuess& plane, bool known) {
   const Eigen::Vector3f guessed = plane.normal;
   for (const float gate : kGates) {
-    if (known && gate > kPlaneGate) continue;  // else it would reach for its neighbours
+    if (known && gate > kPlaneGate) continue;  // otherwise it would include neighbouring surfaces
     collect(mesh, facts, plane, gate, gate == kPlaneGate);
     if (support_.points < kLeastPoints || !solve(facts, plane)) return false;
-    if (plane.normal.dot(guessed) < kFaceCosine) return false;  // turned into something else
+    if (plane.normal.dot(guessed) < kFaceCosine) return false;  // it has turned into something else
   }
   collect(mesh, facts, plane, kPlaneGate, true);
   if (support_.points < kLeastPoints) return false;

@@ -12,16 +12,17 @@
 namespace swiftlet {
 namespace {
 
-// Below, the line in which two planes meet is known to many times what the planes are.
+// At smaller angles the planes' intersection line is much less accurate than the planes.
 constexpr double kLeastSine = 0.5;  // 30 degrees
-// A corner of a face that far from the line does not look at the fold.
+// Faces with a corner farther from the line do not span the fold.
 constexpr double kFarthest = 1.0;  // m
-// Points that lie on the line already: nothing to fold.
+// A corner nearer to the line is already on it: nothing to fold.
 constexpr double kNearest = 0.02;  // m
-// Both on the side that they are seen from, or both behind (an outer edge), give or take their noise.
+// Tolerance for noise when testing whether both corners are in front of the other's plane, or both behind it
+// (an outer edge).
 constexpr double kSlack = 0.05;  // m
 
-/// The line in which two planes meet.
+/// Intersection line of two planes.
 struct Line {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
@@ -65,7 +66,7 @@ class Folder {
     std::uint32_t vertex = 0;
   };
 
-  // The corner that is alone on its plane; 3 when the face is none to fold.
+  // The corner that is alone on its plane; 3 if the face cannot be folded.
   [[nodiscard]] std::size_t loneCorner(const MeshFace& face) const {
     for (const std::uint32_t v : face.vertex) {
       if (v >= landmarks_ || plane_[v] == 0) return 3;
@@ -114,7 +115,7 @@ class Folder {
     const double off_p = (p - along_p * line.direction).norm();
     const double off_q = (q - along_q * line.direction).norm();
     if (!(std::max(off_p, off_q) <= kFarthest) || !(std::min(off_p, off_q) >= kNearest)) return false;
-    // line.point is on both planes: heights over the other's.
+    // line.point is on both planes, so these are heights above the other's plane.
     const double over_b = plane_b.normal.dot(p);
     const double over_a = plane_a.normal.dot(q);
     const bool inner = over_a > -kSlack && over_b > -kSlack;

@@ -9,18 +9,18 @@ namespace swiftlet {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// A landmark some metres off is known to centimetres: two bins hold a plane's vertices. Like the noise of
-// stereo the bins grow with the square of the distance: four times as wide at kReach, and there is no end.
+// A landmark some metres away is accurate to centimetres, so two bins hold a plane's vertices. Like the noise
+// of stereo, bins grow with the square of the distance: four times as wide at kReach, and without a limit.
 constexpr float kBinSize = 0.05F;  // m, nearby
 constexpr std::size_t kDistanceBins = 512;
 constexpr float kHalfBins = 0.5F * static_cast<float>(kDistanceBins);
 constexpr float kReach = kHalfBins * kBinSize;  // 12.8 m
-constexpr std::size_t kAzimuthBins = 120;  // 3 degrees: 8 cm over 3 m of wall on either side of its middle
-constexpr std::size_t kHeightRows = 2;     // what looks up, what looks down
-// A triangle with edges of 30 cm and corners off by 3 cm is off by 8 degrees (1 sigma).
-constexpr float kMaxTiltSine = 0.342F;    // sin(20 deg): a face may stand for a direction
+constexpr std::size_t kAzimuthBins = 120;       // 3 degrees: 8 cm at 3 m along a wall from its middle
+constexpr std::size_t kHeightRows = 2;          // faces that look up, faces that look down
+// A triangle with edges of 30 cm and corners off by 3 cm is tilted by 8 degrees (1 sigma).
+constexpr float kMaxTiltSine = 0.342F;    // sin(20 deg): largest tilt of a face that votes
 constexpr float kMaxTiltCosine = 0.940F;  // its cosine
-constexpr int kAzimuthSpread = 3;         // bins to either side that a face votes for: 9 degrees
+constexpr int kAzimuthSpread = 3;         // bins on either side that a face votes for: 9 degrees
 constexpr float kLargestVote = 0.25F;     // m^2
 constexpr std::array<float, 3> kThird{1.0F / 3, 1.0F / 3, 1.0F / 3};
 
@@ -30,7 +30,7 @@ std::size_t azimuthBin(const Eigen::Vector3f& normal) {
   return static_cast<std::size_t>(bin) % kAzimuthBins;
 }
 
-// From 0 to kDistanceBins; a bin's middle is at its index and a half.
+// From 0 to kDistanceBins; bin i has its middle at i + 0.5.
 float placeOf(float distance) { return kHalfBins + distance / (1 + std::abs(distance) / kReach) / kBinSize; }
 float distanceAt(float place) {
   const float shortened = (place - kHalfBins) * kBinSize;
@@ -55,7 +55,7 @@ void PlaneVotes::clear() {
   std::fill(stale_.begin(), stale_.end(), std::uint8_t{1});
 }
 
-// Shared by the two bins whose middles are nearest.
+// Divides the weight between the two bins with the nearest middles.
 void PlaneVotes::spread(std::size_t row, float distance, float weight) {
   const float at = placeOf(distance) - 0.5F;
   if (!(at >= 0) || at >= static_cast<float>(kDistanceBins - 1)) return;

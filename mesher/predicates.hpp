@@ -96,8 +96,8 @@ constexpr int inCircleInIntegers(const GridArm& a, const GridArm& b, const GridA
 }
 
 /// Exact sign: +1 if the point at which the arms start is inside the circle through their ends a, b, c
-/// (counter-clockwise), -1 outside, 0 on it. For clockwise ends the sign is reversed; for collinear ends it
-/// tells the side of their line.
+/// (counter-clockwise), -1 outside, 0 on it. For clockwise ends the sign is reversed. For collinear ends it
+/// gives the side of their line.
 constexpr int inCircle(const GridArm& a, const GridArm& b, const GridArm& c) {
   const int side = inCircleByFilter(a, b, c);
   return side != 0 ? side : inCircleInIntegers(a, b, c);

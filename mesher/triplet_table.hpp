@@ -1,6 +1,6 @@
 #pragma once
-// Hash table of faces by their three vertices, in any order. Memory: 20 bytes an entry, twice as many entries
-// as faces, reserved by the constructor. clear() is O(1).
+// Hash table of faces by their three vertices, in any order. Memory: 20 bytes per entry and twice as many
+// entries as faces, reserved by the constructor. clear() is O(1).
 
 #include <algorithm>
 #include <array>
