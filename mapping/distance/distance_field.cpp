@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-// The window moves once the vehicle is an eighth of it away from its middle.
+// The window moves when the vehicle is farther from its middle than 1 / kSlack of the window's size.
 constexpr int kSlack = 8;
 constexpr int kStep = kDistanceStep;
 
@@ -16,8 +16,8 @@ constexpr std::size_t kLanes = static_cast<std::size_t>(NearestSeeds::kColumns) 
 template <typename Value>
 using Lanes = std::array<Value, kLanes>;
 
-/// From words of NearestSeeds; nothing is known of surfaces from `edges` and `edge_y` cells on. `rest`,
-/// `tag`: the other bits.
+/// Converts words of NearestSeeds to words of NearestWord, in place. Surfaces farther than `edges` or
+/// `edge_y` cells may be missing from the window. `rest`, `tag`: the other bits.
 void toNearest(Lanes<std::uint32_t>& words, const Lanes<int>& edges, int edge_y,
                const Lanes<std::uint32_t>& rest, std::uint32_t tag) {
   for (std::size_t i = 0; i < kLanes; ++i) {
@@ -38,7 +38,7 @@ int wrapped(int a, int b) {
   return rest < 0 ? rest + b : rest;
 }
 
-// Origins are kept for readers in steps, 21 bits an axis.
+// The origin that readers use is packed in units of kStep, 21 bits per axis.
 constexpr std::uint64_t kOriginMask = (1ULL << 21U) - 1;
 constexpr std::int64_t kOriginBias = 1 << 20;
 
@@ -57,7 +57,7 @@ DistanceLimits checked(DistanceLimits limits) {
   return limits;
 }
 
-/// Cells to the nearest one outside a line of `count`.
+/// Steps to the nearest cell outside a line of `count` cells.
 int edge(int at, int count) { return std::min(at + 1, count - at); }
 
 }  // namespace
@@ -147,8 +147,8 @@ void DistanceField::put(std::size_t slot, int y, std::uint32_t word) {
 
 void DistanceField::setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                               const std::array<Space, kDistanceStep>& space) {
-  // The window begins and ends at multiples of kDistanceStep: a row lies in it whole, and in slots side by
-  // side.
+  // The window begins and ends at multiples of kDistanceStep, so it contains the whole row, in adjacent
+  // slots.
   if (!inside(first)) return;
   const std::size_t slot = slotOf(first);
   const std::uint32_t tag = tagOf(first);
@@ -173,13 +173,13 @@ bool DistanceField::follow(const Eigen::Vector3d& p_map) {
     const int steps = std::min(std::abs(to - from), cells);
     origin_[axis] = to;
     clearSlab(axis, to > from ? to + cells - steps : to, to > from ? to + cells : to + steps);
-    // Who asks before this finds what left unknown.
+    // Until then, queries use the old origin and find the cells that left unknown, by their tags.
     publishOrigin();
   }
   return origin_ != before;
 }
 
-/// The cells that entered, from `first` to before `last`, are unknown.
+/// Sets the cells that entered the window, [first, last) along `axis`, to unknown.
 void DistanceField::clearSlab(int axis, int first, int last) {
   Eigen::Vector3i low = origin_;
   Eigen::Vector3i high = origin_ + limits_.cells;
@@ -199,7 +199,7 @@ void DistanceField::clearSlab(int axis, int first, int last) {
       }
     }
   }
-  // All lies elsewhere in the window now.
+  // The contents have moved relative to the window: transform all planes again.
   std::fill(surface_changed_.begin(), surface_changed_.end(), std::uint8_t{1});
   std::fill(unknown_changed_.begin(), unknown_changed_.end(), std::uint8_t{1});
   changed_ = true;
@@ -252,12 +252,12 @@ void DistanceField::findSurfaces() {
   }
 }
 
-/// What readers see of the cells x to x + 7, z and z + 1, for every y.
+/// Writes the words that readers use, for the cells x to x + 7, z and z + 1 and every y.
 void DistanceField::writeLines(int x, int z) {
   const Eigen::Vector3i& n = limits_.cells;
   const auto lines = surfaces_.transformLines(x, z);
   const std::uint8_t* known = known_.line(x, z);
-  // A surface outside the window may be nearer than what is farther than the window's edge.
+  // Surface beyond the window's edge is not seen, so distances larger than that to the edge are not certain.
   Lanes<int> edges;
   for (int i = 0; i < static_cast<int>(kLanes); ++i)
     edges[static_cast<std::size_t>(i)] =
@@ -277,7 +277,7 @@ void DistanceField::writeLines(int x, int z) {
     for (std::size_t i = 0; i < kLanes; ++i) nearest_[slot + i].store(words[i], std::memory_order_relaxed);
     slot += kLanes;
     if (wrapped(first.y() + y + 1, n.y()) != 0) continue;
-    // Around the window's seam.
+    // Slots wrap around here.
     slot -= static_cast<std::size_t>(n.y()) * kLanes;
     tag ^= 2U << kTagShift;
   }

@@ -3,14 +3,17 @@
 // window around the vehicle.
 //
 // A window of cells that follows the vehicle, in fixed memory. The writer (the map thread) sets which cells
-// hold surface, are free or unknown. update() finds the nearest surface cell of every cell again (exactly, by
+// hold surface, are free or unknown. update() recomputes the nearest surface cell of every cell (exactly, by
 // NearestSeeds) and the distance to the nearest unknown cell; its cost does not depend on how much changed.
-// Readers on other threads query without locks or waiting. The window is arrays of 32-bit words, each written
-// and read as a whole, and each tells which of the cells that share its slot it belongs to. A query during an
-// update finds old or new words; if the surface that a word refers to has disappeared, the answer is "at
-// least". Frames: map; metres. Errors: none; the writer ignores cells outside the window, and readers find
-// them unknown. Memory: 13 bytes a cell. Cost: an update about 40 ms for the default window, a query about
-// 1 us. docs/distance.md.
+//
+// Readers on other threads query without locks or waiting. The window is stored in atomic 32-bit words. Cells
+// one window size apart share a slot; a tag in each word tells which of them it describes. A query during an
+// update sees old or new words; if the surface that a word refers to has disappeared, the answer is "at
+// least".
+//
+// Frames: map; metres. Errors: none; the writer ignores cells outside the window, and queries there return
+// unknown. Memory: 13 bytes a cell. Cost: an update about 40 ms for the default window, a query about 1 us.
+// docs/distance.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -46,13 +49,13 @@ class DistanceField {
   /// Keeps `p_map` near the middle of the window. Cells that leave are forgotten; cells that enter are
   /// unknown until the caller sets them. True if the window moved.
   bool follow(const Eigen::Vector3d& p_map);
-  /// Sets cells without surface in a row along x from `first` (x a multiple of kDistanceStep): those whose
-  /// bit is set in `cells`.
+  /// Sets cells without surface in a row of kDistanceStep cells along x from `first` (its x a multiple of
+  /// kDistanceStep). Only cells whose bit is set in `cells` are written.
   void setSpaces(const Eigen::Vector3i& first, std::uint32_t cells,
                  const std::array<Space, kDistanceStep>& space);
   /// Sets a cell that holds surface.
   void setSurface(const Eigen::Vector3i& cell, Space space, const CellSurface& point);
-  /// Updates the distances from the cells, which contain all images up to `up_to`.
+  /// Recomputes the distances after changes. `up_to`: all images up to this stamp are in the cells.
   void update(Stamp up_to);
 
   // For any reader, on any thread.
@@ -95,12 +98,12 @@ class DistanceField {
   Eigen::Vector3i origin_;
   std::atomic<std::uint64_t> shown_origin_{0};
   std::atomic<std::int64_t> newest_{0}, up_to_{0};
-  // By slot: for each eight of x, each two of z and each y, the sixteen cells in order.
+  // By slot. Groups of sixteen cells (8 along x, 2 along z) are ordered by x, then z, then y.
   std::vector<Word> state_;    ///< the space of the cell, and the surface in it
   std::vector<Word> nearest_;  ///< its nearest surface, and the radius of known space
-  // Of the writer: bits of the same slots, and changes since the last update, by y in the window.
+  // Used only by the writer. One bit per slot:
   std::vector<std::uint8_t> surface_bits_, unknown_bits_;
-  std::vector<std::uint8_t> surface_changed_, unknown_changed_;
+  std::vector<std::uint8_t> surface_changed_, unknown_changed_;  ///< since update(), by y in the window
   bool changed_ = false;
   NearestSeeds surfaces_;
   KnownRange known_;

@@ -1,4 +1,4 @@
-// Reading a distance field: any thread.
+// Queries of a distance field, from any thread.
 
 #include <cmath>
 
@@ -8,14 +8,14 @@
 namespace swiftlet {
 namespace {
 
-// A query goes along the surface for so many cells at most; on logs it needs one or two.
+// Maximum number of moves along the surface in a query. On logs it needs one or two.
 constexpr int kMostDescents = 4;
 
 Eigen::Vector3i cornerOf(int i) { return {i & 1, i >> 1 & 1, i >> 2 & 1}; }
 
 }  // namespace
 
-/// A cell that holds surface, from the first corner of a query [cells].
+/// A cell that holds surface, relative to the first corner of a query [cells].
 struct DistanceField::Holder {
   Eigen::Vector3i cell;
   std::uint32_t state = 0;
@@ -24,20 +24,21 @@ struct DistanceField::Holder {
   }
 };
 
-/// What a query asks of one of the eight cells around the point.
+/// What a query reads of one of the eight cells around the point.
 struct DistanceField::Corner {
   Space space = Space::kUnknown;
   std::uint32_t nearest = 0;  ///< NearestWord
   bool held = false;          ///< its nearest surface is still there
   Holder holder;
-  /// No surface lies nearer to the cell's middle [cells].
+  /// Lower bound of the distance from the cell's centre to any surface [cells].
   [[nodiscard]] float atLeast() const {
     if ((nearest & NearestWord::kHasSurface) == 0) return NearestWord::atLeast(nearest);
     return NearestWord::steps(nearest).cast<float>().norm() - NearestWord::kSpread;
   }
 };
 
-/// False where one is of another place: outside the window, or the window moves.
+/// Reads the eight cells. False if a word belongs to another cell: the point is outside the window, or the
+/// window is moving.
 bool DistanceField::corners(const Eigen::Vector3i& first, std::array<Corner, 8>& out) const {
   for (int i = 0; i < 8; ++i) {
     const Eigen::Vector3i cell = first + cornerOf(i);
@@ -62,8 +63,8 @@ bool DistanceField::findHolder(const Eigen::Vector3i& first, Holder& holder) con
   return StateWord::holds(holder.state, tagOf(cell));
 }
 
-/// The nearest cell need not hold the nearest point: from the nearest of those that the corners name from
-/// neighbour to neighbour along the surface, as long as that leads nearer.
+/// Finds the cell with the nearest surface point, which need not be the nearest cell. Starts at the nearest
+/// of the cells that the corners name and moves to neighbours while one is nearer.
 DistanceField::Holder DistanceField::descend(const Eigen::Vector3i& first, const Eigen::Vector3f& part,
                                              const std::array<Corner, 8>& corner) const {
   Holder best = corner[0].holder;
@@ -119,7 +120,7 @@ DistanceSample DistanceField::query(const Eigen::Vector3d& p_map) const {
   return out;
 }
 
-/// The distance between cells' middles is linear along each axis. In cells.
+/// Interpolates trilinearly between the distances at the eight cells' centres [cells].
 void DistanceField::interpolate(const std::array<Corner, 8>& corner, const Holder& near_point,
                                 const Eigen::Vector3d& part, DistanceSample& out) {
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
@@ -128,7 +129,8 @@ void DistanceField::interpolate(const std::array<Corner, 8>& corner, const Holde
     float squared = near_point.squaredTo(bit.cast<float>());
     for (const Corner& one : corner) squared = std::min(squared, one.holder.squaredTo(bit.cast<float>()));
     const Space space = corner[static_cast<std::size_t>(i)].space;
-    // Between the point and an unknown cell there is no surface that is known. An unknown point has no side.
+    // No known surface separates the point from an unknown corner: such a corner takes the point's side. A
+    // point in unknown space has no side, and all distances are positive.
     const bool behind = out.space != Space::kUnknown &&
                         (space == Space::kUnknown ? out.space : space) == Space::kBehindSurface;
     const double distance = static_cast<double>(behind ? -std::sqrt(squared) : std::sqrt(squared));

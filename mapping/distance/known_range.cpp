@@ -17,7 +17,7 @@ void KnownRange::update() {
   }
 }
 
-/// Of the coarse cells x to x + 7, z and z + 1, for every y.
+/// Computes the radii of the coarse cells x to x + 7, z and z + 1, for every y.
 void KnownRange::take(int x, int z) {
   const auto lines = unknown_.transformLines(x, z);
   const int columns = std::min(NearestSeeds::kColumns, coarse_.x() - x);

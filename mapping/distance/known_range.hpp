@@ -1,10 +1,10 @@
 #pragma once
 // Radius of known space around each cell of a window, as a lower bound.
 //
-// Distances are measured between coarse cells of two cells a side, to those that contain an unknown cell, and
-// from face to face, so that the radius holds for every point of the cell. Everything outside the window is
-// unknown. Memory: 0.6 bytes a cell. Cost: a tenth of NearestSeeds on the cells themselves. Errors: none. Not
-// thread safe.
+// Computed on coarse cells of 2 x 2 x 2 cells, which are unknown if any of their cells is. Distances are
+// measured from face to face, so the radius holds for every point of the cell. Everything outside the window
+// is unknown. Memory: 0.6 bytes a cell. Cost: a tenth of NearestSeeds on the cells themselves. Errors: none.
+// Not thread safe.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -45,7 +45,7 @@ class KnownRange {
   Eigen::Vector3i coarse_;
   int reach_;
   NearestSeeds unknown_;
-  std::vector<std::uint8_t> range_;  ///< by four of x, z, y, x
+  std::vector<std::uint8_t> range_;  ///< cells; by group of four along x, then z, y, and x in the group
 };
 
 template <typename UnknownOf>

@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-// Steps are taken so many at a time.
+// Number of steps taken at a time.
 constexpr int kStride = 4;
 constexpr int kNoSeed = -(1 << 20);
 
@@ -105,7 +105,7 @@ void NearestSeeds::transformRow(std::span<const std::uint8_t> seeds) {
   fillBetween(before, static_cast<int>(row_.size()) - kNoSeed);
 }
 
-/// The row's words from the seed at `before` to the one at `after`, each for the cells nearer to it.
+/// Fills the row from the seed at `before` to the one at `after`; each cell refers to the nearer of the two.
 void NearestSeeds::fillBetween(int before, int after) {
   const int count = static_cast<int>(row_.size());
   const int first = std::max(before, 0);
@@ -120,7 +120,7 @@ void NearestSeeds::fillBetween(int before, int after) {
     std::copy_n(before_seed_.end() - 1 - (after - middle), last - middle, row_.begin() + middle);
 }
 
-/// From `line_` to `out_`.
+/// Transforms `line_` into `out_`.
 void NearestSeeds::alongLine(int count, const Steps& steps) {
   // Beyond the line's ends there are no seeds.
   Block* const line = &line_[static_cast<std::size_t>(margin_)];
@@ -137,7 +137,7 @@ void NearestSeeds::alongLine(int count, const Steps& steps) {
       }
     }
     out_[static_cast<std::size_t>(i)] = best;
-    // From a place to the next the distance grows by one at most.
+    // From one cell to the next the distance grows by at most one.
     most = furthest_[std::min(static_cast<std::size_t>(squaredOf(largest(best))), furthest_.size() - 1)];
   }
 }
@@ -155,7 +155,7 @@ void NearestSeeds::transformPlane(int y) {
     for (std::size_t block = 0; block < blocks; ++block)
       std::memcpy(&kept[block * layers + z], &row_[block * kColumns], sizeof(Columns));
   }
-  // Two blocks of columns at a time, as the lanes are made for layers.
+  // Two blocks of columns at a time, in the lanes that transformLines() uses for two layers.
   for (std::size_t first = 0; first < blocks; first += kLayers) {
     const std::size_t count = std::min<std::size_t>(kLayers, blocks - first);
     Block* const line = &line_[static_cast<std::size_t>(margin_)];

@@ -1,12 +1,13 @@
 #pragma once
 // The exact nearest seed within reach of every cell of a window, in three passes, one for each axis.
 //
-// A pass along a line gives each cell the least of (squared distance in the axes before + square of the steps
-// along this one), which is exact for any order of axes (Felzenszwalb, Huttenlocher, "Distance Transforms of
-// Sampled Functions", Theory of Computing 8, 2012). Within a limited reach no envelope of parabolas is
-// needed: cells search their line outwards, step by step, until no step can improve the result, and lines are
-// processed side by side in vector lanes. The low bits of the same word identify the seed, so that the least
-// word names it; among equally near seeds the least word wins. Along x seeds are bits.
+// A pass along a line gives each cell the least of (squared distance along the axes so far + square of the
+// steps along this one), which is exact for any order of axes (Felzenszwalb, Huttenlocher, "Distance
+// Transforms of Sampled Functions", Theory of Computing 8, 2012). Because the reach is limited, no envelope
+// of parabolas is needed: a cell searches its line outwards until no step can improve the result. Lines are
+// processed side by side in vector lanes. The low bits of a word identify the seed; among equally near seeds
+// the least word wins. The pass along x works on bits.
+//
 // Use: for each y set the seeds of a plane and call transformPlane(y); then call transformLines() for all
 // columns. Unchanged planes need not be set again. Errors: none. Memory: 4 bytes a cell. Cost: some 5 ns a
 // cell at a reach of 40. No allocation after the constructor. Not thread safe.
@@ -86,10 +87,10 @@ class NearestSeeds {
   int blocks_;  ///< of kColumns along x
   Steps in_z_, in_y_;
   std::vector<std::uint8_t> furthest_;          ///< by squared distance: steps that may improve the next cell
-  std::vector<Word> after_seed_, before_seed_;  ///< a row's words beside a seed, outwards and inwards
+  std::vector<Word> after_seed_, before_seed_;  ///< words of the cells after and before a seed, in order of x
   std::vector<std::uint8_t> seeds_;             ///< of the present plane
   std::vector<Word> row_;
-  std::vector<Columns> kept_;  ///< after x and z, by y, block and z
+  std::vector<Columns> kept_;  ///< after the passes along x and z; by y, block and z
   Line line_;                  ///< the present line, with room before and after it
   Line out_;
 };

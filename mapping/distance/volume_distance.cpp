@@ -20,7 +20,7 @@ Eigen::Vector3i firstCell(const BlockIndex& block) {
   return Eigen::Vector3i(block.x, block.y, block.z) * kBlockSide;
 }
 
-/// Surface passes between the two.
+/// Whether surface passes between two voxels.
 bool crossed(float own, float beside) { return !std::isnan(beside) && (own < 0) != (beside < 0); }
 
 }  // namespace
@@ -41,7 +41,7 @@ void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, co
   newest_ = newest;
   const Eigen::Vector3i origin = field_.origin();
   if (field_.follow(p_map_vehicle)) {
-    // Blocks that were not in the window before are read anew.
+    // Read again the blocks that were not in the window before.
     for (Seen& seen : seen_) {
       if (seen.key != 0 && !inWindow(indexFrom(seen.key), origin)) seen = {};
     }
@@ -70,7 +70,7 @@ void VolumeDistance::findChanges() {
     Seen& seen = seen_[slot];
     if (seen.key == now.key && seen.revision == now.revision) continue;
     if (seen.key != 0 && seen.key != now.key) {
-      // It may stand elsewhere in the volume by now, or have come back.
+      // The dropped block may be in the volume again, in another slot.
       const BlockIndex dropped = indexFrom(seen.key);
       if (volume_.find(dropped) == VoxelVolume::kNone) fill(dropped, 0);
       askAround(dropped);
@@ -88,7 +88,7 @@ void VolumeDistance::ask(std::uint32_t slot) {
   waits_[slot] = 1;
 }
 
-/// What a block's outer voxels hold depends on the blocks beside it.
+/// Marks the face neighbours for reading: surface in their outer voxels depends on this block.
 void VolumeDistance::askAround(const BlockIndex& block) {
   for (const BlockIndex& face : kFaces) {
     const std::uint32_t slot = volume_.find(block + face);
@@ -128,7 +128,7 @@ void VolumeDistance::gather(std::uint32_t slot) {
   value_.fill(kUnseen);
   const auto take = [this](std::uint32_t from, const BlockIndex& beside) {
     const VoxelBlock* const voxels = volume_.voxels(from);
-    // Of a block beside only the layer that touches.
+    // Only the touching layer of a neighbour is needed.
     const auto range = [](int side) {
       return side == 0  ? std::pair{0, kBlockSide}
              : side < 0 ? std::pair{kBlockSide - 1, kBlockSide}
@@ -159,7 +159,7 @@ void VolumeDistance::gather(std::uint32_t slot) {
   }
 }
 
-/// Eight voxels: those that hold surface by themselves, the others as a row.
+/// Sets eight voxels: those with surface one by one, the others as a row.
 void VolumeDistance::readRow(const Eigen::Vector3i& first, int y, int z) {
   std::array<Space, kBlockSide> space;
   std::uint32_t holding = 0;
@@ -183,8 +183,9 @@ void VolumeDistance::readRow(const Eigen::Vector3i& first, int y, int z) {
   }
 }
 
-/// Where the plane with the slopes of the distance has its zero. Slopes [per voxel]: across the surface, of
-/// both sides' size where it passes on both; else from one side to the other.
+/// The zero of a plane with the slopes of the distance [m per voxel]. Along an axis the slope is taken across
+/// the surface. If the surface passes on both sides, it is the mean size of both; if on none, the central
+/// difference (one-sided beside unobserved voxels).
 CellSurface VolumeDistance::surfaceAt(const float* own) {
   CellSurface point;
   Eigen::Vector3f slope = Eigen::Vector3f::Zero();

@@ -1,12 +1,12 @@
 #pragma once
 // Updates a distance field from a volume: surfaces, free space and unknown space of changed blocks.
 //
-// Per step the window follows the vehicle. Then at most `effort.blocks` blocks are read that changed since
-// they were last read, or are neighbours of such blocks, in the order of the volume's slots from where the
-// last step ended. Then the field is updated. A voxel holds surface if the signed distance changes sign to a
-// neighbour that is not nearer to the surface; the surface point is found by one Newton step along the slope
-// of the distance. Dropped blocks become unknown. Cells are the volume's voxels. Map axes, metres. Memory: 17
-// bytes for each slot of the volume, besides the field. Not thread safe, except for the field's readers.
+// A step moves the window with the vehicle, reads changed blocks and their neighbours, and updates the field.
+// It reads at most `effort.blocks` blocks, in the order of the volume's slots, and continues where the last
+// step ended. A voxel holds surface if the signed distance changes sign towards a neighbour that is not
+// nearer to the surface; one Newton step along the slope of the distance gives the surface point. Dropped
+// blocks become unknown. Cells are the volume's voxels. Map axes, metres. Memory: 17 bytes for each slot of
+// the volume, besides the field. Not thread safe, except for the field's readers.
 
 #include <array>
 #include <vector>

@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-/// In place of a block without voxels: seen free as a whole, or not.
+/// Stands for a block without voxels: wholly free or never observed.
 constexpr VoxelBlock evenBlock(std::uint16_t weight) {
   VoxelBlock block{};
   block.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
@@ -20,18 +20,19 @@ constexpr VoxelBlock evenBlock(std::uint16_t weight) {
 }
 constexpr VoxelBlock kFreeBlock = evenBlock(std::numeric_limits<std::uint16_t>::max());
 constexpr VoxelBlock kNowhereSeen = evenBlock(0);
-/// Of a difference [steps]: there is none as large.
+/// Larger than any difference of distances [steps].
 constexpr int kNoLimit = 1 << 17;
-/// A vertex keeps this share of an edge from its ends, so that no triangle has a corner twice.
+/// Least distance of a vertex from the ends of its edge, as a share of the edge, so that no two corners of a
+/// triangle coincide.
 constexpr float kEdgeMargin = 1e-3F;
 
 constexpr std::size_t neighbourAt(int x, int y, int z) {
   return static_cast<std::size_t>((x + 1) + 3 * ((y + 1) + 3 * (z + 1)));
 }
 
-/// Voxels of corners along an edge, and edges of one axis.
+/// Corners along a side of the block, and edges along one axis.
 constexpr std::size_t kSide = kBlockSide + 1, kEdges = kSide * kSide * kSide;
-/// From a cube's place to that of each of its edges.
+/// Offset from the index of a cube's lowest corner to that of each of its edges.
 constexpr std::array<std::uint16_t, 12> kEdgePlace = [] {
   std::array<std::uint16_t, 12> place{};
   for (std::size_t e = 0; e < place.size(); ++e) {
@@ -64,7 +65,7 @@ BlockSurface::BlockSurface(const VoxelVolume& volume, const ConfusionModel& conf
                                                  static_cast<float>(kNoLimit)))
                      : kNoLimit) {}
 
-/// False where all that the block's cubes touch lies on one side.
+/// Finds the neighbours. False if all voxels that the block's cubes touch are on one side of the surface.
 bool BlockSurface::gatherNeighbours(const BlockIndex& block) {
   block_ = block;
   std::uint8_t sides = 0;
@@ -93,7 +94,7 @@ bool BlockSurface::gatherNeighbours(const BlockIndex& block) {
   return true;
 }
 
-/// The row of voxels at (y, z) from -1 to side + 1, out of the three blocks it passes.
+/// Fills the row of voxels at (y, z), from x = -1 to kBlockSide + 1, from the three blocks along it.
 void BlockSurface::fillRow(int y, int z, const std::array<const VoxelBlock*, 3>& along) {
   const std::size_t from = offsetOf({0, y, z});
   const auto one = [&](const VoxelBlock* block, std::size_t at) {
@@ -134,7 +135,7 @@ void BlockSurface::fillPadded() {
   }
 }
 
-/// The cubes of a row that surface passes through, bit by bit.
+/// One bit per cube of a row: whether the surface passes through it.
 inline std::uint32_t BlockSurface::cubesIn(std::size_t y, std::size_t z) const {
   const std::uint32_t any = behind_[z][y] | behind_[z][y + 1] | behind_[z + 1][y] | behind_[z + 1][y + 1];
   const std::uint32_t all = behind_[z][y] & behind_[z][y + 1] & behind_[z + 1][y] & behind_[z + 1][y + 1];
@@ -181,7 +182,7 @@ void BlockSurface::addCube(int x, int y, int z, SurfacePatch& patch) {
   }
 }
 
-/// The largest difference along a cube's edges.
+/// The largest difference along a cube's edges [steps].
 int BlockSurface::steps(int x, int y, int z) const {
   const auto corner = [&](unsigned i) {
     return int{value_[padded(x + static_cast<int>(i & 1U), y + static_cast<int>(i >> 1U & 1U),

@@ -40,7 +40,7 @@ void SurfaceStage::findChanges() {
     }
     if (header.state == BlockState::kFree) {
       if (!header.isWhollyFree()) continue;
-      // What it had before it was dropped is no more.
+      // The surface that it had before no longer exists.
       store_.takeOut(header.index);
     }
     for (int z = -1; z <= 1; ++z) {

@@ -6,7 +6,7 @@
 namespace swiftlet {
 namespace {
 
-/// Of the entries, those that go at once when the store is full.
+/// A full store drops 1 / kLeavingShare of its entries at once.
 constexpr std::size_t kLeavingShare = 32;
 /// A block that a flat surface crosses has some 80 vertices and 130 triangles.
 constexpr std::size_t kUsualPages = 11;
@@ -80,7 +80,7 @@ void SurfaceStore::takeOut(const BlockIndex& block) {
   if (const std::uint32_t old = find(block); old != kNone) remove(old);
 }
 
-/// False where `block` itself would be among those that go.
+/// False if `block` itself would be among the dropped ones.
 bool SurfaceStore::makeRoom(std::size_t pages, const BlockIndex& block, const Eigen::Vector3f& vehicle) {
   const Farness own = farness(block, kNone, vehicle);
   while (free_pages_ < pages || unused_entries_.empty()) {
