@@ -36,7 +36,7 @@ bool VolumeDistance::inWindow(const BlockIndex& block, const Eigen::Vector3i& or
 void VolumeDistance::step(Stamp newest, const Eigen::Vector3d& p_map_vehicle, const DistanceEffort& effort,
                           DistanceStep& out) {
   out = {};
-  // Again only for another image: one that came since may not have been fused.
+  // Announce a stamp only once: since then, the caller may have announced a newer image that is not fused.
   if (newest != newest_) field_.announce(newest);
   newest_ = newest;
   const Eigen::Vector3i origin = field_.origin();

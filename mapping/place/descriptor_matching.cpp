@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-// More than any two descriptors differ.
+// Larger than any distance between descriptors.
 constexpr std::uint16_t kFar = 512;
 
 }  // namespace

@@ -66,7 +66,7 @@ class DescriptorMatcher {
   std::array<std::uint16_t, kMaxPlaceFeatures> order_{};                 ///< feature at each sorted position
   std::array<std::uint32_t, kMaxPlaceFeatures> node_{};                  ///< node at each position, ascending
   std::array<std::uint16_t, kMaxPlaceFeatures> row_{};                   ///< distances of one old feature
-  std::array<std::uint16_t, kMaxPlaceFeatures> nearest_old_{};  ///< of each position, and its distance
+  std::array<std::uint16_t, kMaxPlaceFeatures> nearest_old_{};  ///< nearest old feature of each position
   std::array<std::uint16_t, kMaxPlaceFeatures> nearest_distance_{};
 };
 

@@ -89,7 +89,7 @@ void peaksOfRow(const std::uint8_t* scores, std::ptrdiff_t stride, int begin, in
                                     Lanes::max(Lanes::load(up + 1), Lanes::load(here - 1)));
     const Bytes after = Lanes::max(Lanes::max(Lanes::load(down - 1), Lanes::load(down)),
                                    Lanes::max(Lanes::load(down + 1), Lanes::load(here + 1)));
-    // Above those before it, at least those after it: above one less.
+    // A peak is above the neighbours before it and at least equal to those after it (above them less one).
     const Bytes limit = Lanes::max(Lanes::max(before, below_least), Lanes::above(after, one));
     Lanes::store(peaks + x, Lanes::above(Lanes::load(here), limit));
   }

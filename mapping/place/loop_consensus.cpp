@@ -11,8 +11,8 @@
 namespace swiftlet {
 namespace {
 
-// 3 sigma of two degrees of freedom, and how much wider (on the square) a hypothesis from a few noisy
-// points is tested.
+// Chi-square gate of two degrees of freedom (3 sigma), and the factor by which it is widened, because a
+// hypothesis comes from a few noisy points.
 constexpr float kGate = 11.83F;
 constexpr float kWide = 9.0F;
 constexpr float kBehind = 1e6F;
@@ -20,12 +20,12 @@ constexpr float kBehind = 1e6F;
 constexpr double kSideSigmas = 3.0;
 // Samples drawn for each one solved, at most.
 constexpr int kDrawsPerIteration = 20;
-// Points nearer than this to infinity give no distance [relative sigma].
+// Points whose inverse depth has a larger relative sigma than this give no distance.
 constexpr double kMaxRelativeSigma = 0.3;
-// Draws after which every match has been let into the samples.
+// Samples are drawn from the best kFirstPool matches at first, and from all after kGrowingDraws draws.
 constexpr int kGrowingDraws = 150;
 constexpr std::size_t kFirstPool = 12;
-// Steps on a hypothesis' inliers, and rounds of choosing them anew.
+// Local refinement of a hypothesis: steps on its inliers, and rounds that select the inliers again.
 constexpr int kLocalSteps = 2;
 constexpr int kLocalRounds = 2;
 
@@ -148,7 +148,7 @@ void LoopConsensus::addErrors(const Lanes& lanes, const SE3& T_to_from) {
     const float ee = ex * ex + ey * ey + ez * ez;
     const float chi = (ee - along * along / (variance * lanes.depth_information[i] + jj)) / variance;
     const bool front = sx * lanes.tx[i] + sy * lanes.ty[i] + sz * lanes.tz[i] > 0;
-    // NaN too is behind.
+    // NaN counts as behind.
     lane_error_[i] = front && chi < kBehind ? chi : kBehind;
   }
   for (std::size_t i = 0; i < count; ++i) {
@@ -221,7 +221,7 @@ Status LoopConsensus::threePoint(std::span<MatchedPoint> points, std::uint64_t s
   int needed = settings_.iterations;
   int draws = kDrawsPerIteration * settings_.iterations;
   for (int draw = 0; draw < draws && result.iterations < needed; ++draw) {
-    // The keyframe that gives the points: in turn, unless one knows too few depths.
+    // Both keyframes give the points in turn, unless one has too few depths.
     const bool from_old = new_pool.size() < 3 || (old_pool.size() >= 3 && draw % 2 == 0);
     const Pool& pool = from_old ? old_pool : new_pool;
     const auto sample = drawSample<3>(random, poolSize(pool.size(), draw));
@@ -286,7 +286,7 @@ Status LoopConsensus::fivePoint(std::span<MatchedPoint> points, std::uint64_t se
   settings.bearing_sigma = sigma > 0 ? sigma : 1.0;
   settings.max_iterations = settings_.five_point_iterations;
   settings.min_inliers = settings_.min_inliers;
-  // Keyframes of one place may stand far apart, with things between them.
+  // Keyframes of one place may be far apart, with points between them.
   settings.min_depth_over_baseline = 0.1;
   mono_.setSettings(settings);
   const std::span<const Eigen::Vector3d> from(mono_new_.data(), count);

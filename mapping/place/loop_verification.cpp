@@ -10,19 +10,18 @@
 namespace swiftlet {
 namespace {
 
-// Rounds of refinement and choosing inliers anew.
+// Rounds of inlier selection and refinement.
 constexpr int kRefineRounds = 3;
-// The first round takes matches within a wider gate (on the chi-square): the start is off.
+// Factor on the chi-square gates of the first round, because the initial pose is rough.
 constexpr double kFirstRoundWidening = 4.0;
-// Guided matches may miss the pose by this much (on the chi-square) more than inliers: the pose moves.
+// Factor on the chi-square gate of guided matches over that of inliers, because the pose will still move.
 constexpr double kGuidedWidening = 2.0;
-// Degrees of freedom that the set noise is worth against the residuals' own: with few matches the scale of
-// the covariance stays near what was set.
+// Weight of the configured noise [degrees of freedom] against that of the residuals, for the scale of the
+// covariance: with few matches it stays near 1.
 constexpr double kScaleDof = 20.0;
-// The noise is never believed to be less than this part (variance) of the set one: matches have errors in
-// common.
+// Least scale of the covariance, because matches have common errors.
 constexpr double kMinScale = 0.5;
-// Noise of twice the set one at most.
+// Largest ratio of noise variance to the configured one: twice its sigma.
 constexpr double kMaxNoiseScale = 4.0;
 constexpr std::uint16_t kFar = 512;
 
@@ -37,7 +36,7 @@ bool finite(const PlaceKeyframe& keyframe) {
 }
 
 // Narrowest spread of directions about their mean [rad]: the square root of the middle eigenvalue of their
-// scatter, of which the least is along the view.
+// scatter. The smallest one belongs to the viewing direction.
 double narrowestSpread(const MatchedPoints& points, bool old_side) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
@@ -56,8 +55,8 @@ double narrowestSpread(const MatchedPoints& points, bool old_side) {
   return std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
 }
 
-// Variance of the used residuals over the set one, by their median: 1 to kMaxNoiseScale. Gates follow it, or
-// they would cut noise that is larger than set and hide it.
+// Ratio of the used residuals' variance to the configured one, from their median; 1 to kMaxNoiseScale. Gates
+// are scaled by it, because otherwise they would cut off noise larger than configured and hide it.
 double noiseScale(const MatchedPoints& points) {
   constexpr std::array<double, 3> kMedians = {0.455, 1.386,
                                               2.366};  // of chi-square, 1 to 3 degrees of freedom
@@ -192,7 +191,7 @@ Status LoopVerifier::refine(LoopVerification& result) {
   for (MatchedPoint& m : points_) m.used = m.chi_squared < noise_scale_ * matchGate(m.dof());
   const SE3 T_old_new = T_body_cam_ * T_cam_ * T_body_cam_.inverse();
   result.T_old_new = T_old_new;
-  // The residuals' own scale, drawn towards the set one.
+  // The scale of the residuals, drawn towards that of the configured noise.
   const double scale = (fit_.chi_squared + kScaleDof) / (std::max(fit_.dof, 0.0) + kScaleDof);
   result.chi_squared_per_dof = fit_.dof > 0 ? fit_.chi_squared / fit_.dof : 0;
   const Matrix6d covariance = std::max(scale, kMinScale) * fit_.information.inverse();
@@ -309,7 +308,7 @@ LoopFate LoopVerifier::run(const PlaceKeyframe& old_keyframe, const PlaceKeyfram
   (void)matcher_.match(old_keyframe.features, new_keyframe.features, settings_.matching, matches_);
   result.matches = matches_.size();
   if (result.matches < settings_.min_matches) return LoopFate::kTooFewMatches;
-  // The consensus draws the best first.
+  // The consensus expects the best matches first.
   std::sort(matches_.begin(), matches_.end(), [](const DescriptorMatch& a, const DescriptorMatch& b) {
     return a.distance != b.distance ? a.distance < b.distance : a.old_feature < b.old_feature;
   });

@@ -50,7 +50,7 @@ bool PlaceDatabase::holds(std::uint32_t slot, std::uint64_t index, std::uint32_t
   return entry.used && entry.index == index && entry.epoch == epoch;
 }
 
-// Rising words below the vocabulary's number.
+// Whether the words rise strictly, are in the vocabulary and have positive values.
 bool PlaceDatabase::fits(const BagOfWords& bag) const {
   for (std::size_t i = 0; i < bag.size(); ++i) {
     if (bag[i].word >= lists_.size() || (i > 0 && bag[i].word <= bag[i - 1].word) || !(bag[i].value > 0))
@@ -110,7 +110,7 @@ void PlaceDatabase::score(const BagOfWords& bag) {
   }
 }
 
-// Islands of the preceding query, in a row, near this one in time.
+// Number of consecutive preceding queries with an island near this one in time.
 int PlaceDatabase::consistency(const Island& island) const {
   int longest = 0;
   for (const Island& other : before_) {
@@ -195,7 +195,7 @@ Status PlaceDatabase::query(Stamp stamp, std::uint32_t epoch, const BagOfWords& 
   return okStatus();
 }
 
-// Ends of the row of keyframes have one neighbour only.
+// The oldest and the newest keyframe have only one neighbour in time.
 std::uint32_t PlaceDatabase::mostRedundant(Stamp stamp, std::uint32_t epoch) const {
   std::uint32_t best = kNoSlot;
   float most = -1;
@@ -215,7 +215,7 @@ std::uint32_t PlaceDatabase::mostRedundant(Stamp stamp, std::uint32_t epoch) con
 bool PlaceDatabase::forget(std::uint32_t slot) {
   if (slot >= entries_.size() || !entries_[slot].used) return false;
   remove(slot);
-  --counts_.removed;  // not by the policy
+  --counts_.removed;  // counts only removals from a full database
   return true;
 }
 

@@ -9,13 +9,13 @@
 namespace swiftlet {
 namespace {
 
-// Around a feature: its patch and the smoothing, one more for rounding.
+// Least distance of a feature from the image border: its patch, the smoothing, one more for rounding.
 constexpr int kBorder = SteeredBrief::kBorder + 1;  // px
 constexpr int kMinCell = 12;                        // px: a cell's least side
-// Features that a cell gives on average: fewer, and weak corners are taken to cover every cell; more, and
-// the image is covered unevenly.
+// Average number of features per cell. With fewer, weak corners are taken to cover every cell; with more, the
+// image is covered unevenly.
 constexpr int kWantedPerCell = 3;
-// Tracked features are looked for in the octaves up to this one (scale 1.7): their patches are of this size.
+// Tracked features are described in one of this many octaves (up to scale 1.7), the size of their patches.
 constexpr int kTrackedOctaves = 4;
 // A corner this near to a described feature of the same octave is the same corner.
 constexpr float kSameCorner = 3.0F;  // px of the octave
@@ -72,8 +72,8 @@ bool PlaceExtractor::inside(int octave, int x, int y) const {
   return x >= kBorder && y >= kBorder && x < level.width - kBorder && y < level.height - kBorder;
 }
 
-// Features of an octave: in proportion to its side, as the distance between distinct corners of one size
-// asks.
+// Number of features of an octave, in proportion to its side. Distinct corners keep a distance in pixels, so
+// smaller octaves hold fewer.
 int PlaceExtractor::share(int octave, int features) const {
   const double shrink = 1 / kOctaveRatio;
   const double first = features * (1 - shrink) / (1 - std::pow(shrink, pyramid_.octaves()));
@@ -94,7 +94,7 @@ void PlaceExtractor::score(int octave) {
   }
 }
 
-// Best first; of equals the one found first stays in front.
+// Best first; equal ones in the order of discovery.
 void PlaceExtractor::keepInCell(Cell& cell, const Spot& spot) const {
   std::size_t at = cell.count;
   while (at > 0 && cell.best[at - 1].score < spot.score) --at;
@@ -123,7 +123,7 @@ void PlaceExtractor::findSpots(int octave, int wanted) {
     peaksOfRow<Lanes>(here, level.stride, kBorder, end, static_cast<std::uint8_t>(settings_.min_score),
                       peaks_.data());
     Cell* row = cells_.data() + static_cast<std::ptrdiff_t>((y - kBorder) / side) * columns;
-    constexpr int kWord = 8;  // peaks are few: eight pixels are looked at together
+    constexpr int kWord = 8;  // peaks are rare: check eight pixels at once
     for (int x = kBorder; x < end; x += kWord) {
       std::uint64_t eight = 0;
       std::memcpy(&eight, peaks_.data() + x, sizeof eight);
@@ -240,7 +240,7 @@ Status PlaceExtractor::extract(const ImageView& image, const CameraModel& camera
   for (int l = 0; l < pyramid_.octaves(); ++l) score<Lanes>(l);
   addTracked(camera, tracked, keyframe);
   const int corners = settings_.features - static_cast<int>(keyframe.features.size());
-  // From the smallest octave on: what one lacks, the next may take.
+  // Smallest octave first. Features that an octave cannot provide are taken from the next one.
   int due = 0;
   for (int l = pyramid_.octaves() - 1; l >= 0; --l) {
     due += share(l, corners);

@@ -9,7 +9,7 @@
 namespace swiftlet {
 namespace {
 
-// Weights of neighbours, in 1/128: a byte times them fits 15 bits with its rounding.
+// Weights of neighbours are in units of 1/128, so that a weighted byte with rounding fits 15 bits.
 constexpr int kWeightBits = 7;
 constexpr int kLanes = 16;
 constexpr int kHalf = kLanes / 2;
@@ -46,7 +46,7 @@ PlacePyramid::PlacePyramid(int width, int height, int octaves)
                         0);
     if (l == 0) continue;
     const int from_width = levels_[static_cast<std::size_t>(l - 1)].width;
-    // Whole blocks: what lies beyond the last column repeats it.
+    // Whole blocks: columns beyond the last repeat it.
     for (int x = 0; x < (level.width + kLanes - 1) / kLanes * kLanes; ++x) {
       const Neighbour n = source(std::min(x, level.width - 1), level.width, from_width);
       if (x % kHalf == 0) level.first.push_back(n.first);

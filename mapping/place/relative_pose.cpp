@@ -84,7 +84,7 @@ Residuals residuals(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t, 
   return out;
 }
 
-// Inverse depth in the old view to begin with.
+// Initial inverse depth in the old view.
 double startInverseDepth(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d& t, const MatchedPoint& m) {
   if (m.old_view.hasDepth()) return m.old_view.inverse_depth;
   if (m.new_view.hasDepth() && m.new_view.inverse_depth > 0) {
@@ -101,11 +101,11 @@ double startInverseDepth(const Eigen::Matrix3d& R_new_old, const Eigen::Vector3d
 bool isBehind(const MatchedPoint& m, const Residuals& at, const Eigen::Matrix3d& H) {
   if (!at.in_front || !std::isfinite(m.inverse_depth)) return true;
   if (m.inverse_depth >= 0) return false;
-  // 1 / H(2, 2) is the least variance that the inverse depth can have: a lenient bound is not needed.
+  // 1 / H(2, 2) is the least possible variance of the inverse depth: the bound is strict on purpose.
   return m.inverse_depth < -kBehindSigmas / std::sqrt(std::max(H(2, 2), std::numeric_limits<double>::min()));
 }
 
-// A tiny weight on the inverse depth where nothing else holds it (no depth, no parallax): 10 m^-1.
+// A weak hold on the inverse depth (sigma 10 m^-1), for points without depth and parallax.
 constexpr double kLooseInformation = 1e-2;
 
 Eigen::Matrix3d pointSystem(const Residuals& at) {
@@ -136,11 +136,11 @@ struct System {
   double cost = 0;
   double chi_squared = 0;
   double dof = 0;
-  int equations = 0;  ///< as dof, whatever the weights
+  int equations = 0;  ///< as dof, without weights
   std::size_t used = 0;
 };
 
-// Of the chi-square at the threshold and beyond: Huber's cost and the weight that stands for it.
+// Huber's cost of a chi-square, and the equivalent weight. `threshold`: sigmas.
 double huberCost(double chi_squared, double threshold) {
   const double limit = threshold * threshold;
   return chi_squared <= limit ? chi_squared : 2.0 * threshold * std::sqrt(chi_squared) - limit;
@@ -176,7 +176,7 @@ double robustCost(double huber, std::span<const MatchedPoint> points) {
   return cost;
 }
 
-// Points behind a view pull nowhere: they leave the refinement.
+// Removes points behind a view from the refinement, because they have no gradient.
 void dropBehind(std::span<MatchedPoint> points) {
   for (MatchedPoint& m : points) m.used = m.used && std::isfinite(m.chi_squared);
 }
@@ -191,7 +191,7 @@ System assemble(const SE3& T_old_new, double huber, std::span<const MatchedPoint
 }
 
 struct Seed {
-  double leverage = 0;  ///< part of the pose's degrees of freedom that the match holds alone
+  double leverage = 0;  ///< share of the pose's degrees of freedom that this match determines
   std::size_t index = 0;
 };
 
@@ -231,7 +231,7 @@ Status refineRelativePose(const RelativePoseSettings& settings, std::span<Matche
   dropBehind(points);
   System system = assemble(T, settings.huber, points);
   for (; fit.steps < settings.steps; ++fit.steps) {
-    // Far from the solution all weights are small: they say nothing yet.
+    // Count equations, not weights: far from the solution all weights are small.
     if (system.equations < 6) return {StatusCode::kDegenerate, "relative pose: too few matches"};
     const Eigen::LDLT<Matrix6d> solver(system.H);
     if (solver.info() != Eigen::Success || !solver.isPositive()) {
@@ -242,7 +242,7 @@ Status refineRelativePose(const RelativePoseSettings& settings, std::span<Matche
     // delta is in the axes of the new view.
     const SE3 next(T.rotation * expSo3(step.head<3>()), T.translation + T.rotation * step.tail<3>());
     placePoints(next, points);
-    // Points that went behind cost more than any others: such a step is not taken.
+    // Points behind a view have infinite cost, so steps that put any there are rejected.
     if (!(robustCost(settings.huber, points) < system.cost)) {
       placePoints(T, points);
       break;
@@ -264,7 +264,7 @@ RelativePoseSupport relativePoseSupport(const RelativePoseSettings& settings,
                                         std::span<const MatchedPoint> points, const SE3& T_old_new,
                                         double reach) {
   constexpr double kUndetermined = std::numeric_limits<double>::infinity();
-  // Of the information, in 1/rad^2 and 1/m^2: below is rounding.
+  // Least reciprocal condition of the information (1/rad^2 and 1/m^2); below, rounding dominates.
   constexpr double kLeastCondition = 1e-10;
   const Eigen::Matrix3d R_new_old = T_old_new.R().transpose();
   const System all = assemble(T_old_new, settings.huber, points);

@@ -7,29 +7,29 @@
 namespace swiftlet {
 namespace {
 
-// Patches: 8 x 8 at half resolution for the search (16 x 16 px of the image), 9 x 9 px to refine.
+// Patches: 8 x 8 at half resolution for the search (16 x 16 px of the image), 9 x 9 px for the refinement.
 constexpr int kSearchSide = 8;
 constexpr int kSearchArea = kSearchSide * kSearchSide;
 constexpr int kRefineRadius = 4;
 constexpr int kRefineSide = 2 * kRefineRadius + 1;
 constexpr int kRefineArea = kRefineSide * kRefineSide;
 constexpr int kMaxSamples = 200;
-// Distance of the samples [px of the whole image].
+// Spacing of the samples [px at full resolution].
 constexpr double kSampleStep = 2.0;
-// Whole-pixel sampling costs correlation: the search asks for less than the refinement.
+// The search requires less than the refinement, because sampling at whole pixels lowers the correlation.
 constexpr float kMinSearchCorrelation = 0.6F;
-// Samples nearer than this to the best belong to its own peak.
+// Samples within this many of the best belong to the same peak.
 constexpr int kPeakWidth = 3;
-// Patches with less contrast than this hold nothing to compare [grey levels, standard deviation].
+// Least contrast of a patch [grey levels, standard deviation].
 constexpr float kMinContrast = 3.0F;
 constexpr int kRefineSteps = 8;
 constexpr double kRefineConverged = 0.02;  // px
 constexpr double kMaxRefineShift = 2.5;    // px from where the search ended
 // Step of the numeric warp [px].
 constexpr double kWarpStep = 4.0;
-// Share of the largest inverse distance that the search's patch is warped for.
+// The search's patch is warped for this share of the largest inverse distance.
 constexpr double kMiddling = 0.1;
-// Matches this far beyond infinity are noise of distant points [sigma].
+// Matches up to this far beyond infinity are distant points with noise [sigma].
 constexpr double kBeyondInfinity = 2.0;
 constexpr int kDepthSteps = 4;
 
@@ -60,7 +60,7 @@ void halve(const ImageView& from, std::uint8_t* to, int width, int height) {
   }
 }
 
-// Zero-mean template of the search, of integers: correlation by three sums.
+// Zero-mean integer template of the search; a correlation takes three sums.
 struct SearchTemplate {
   std::array<std::int16_t, kSearchArea> value{};  // grey - mean, rounded
   float norm = 0;
@@ -82,7 +82,7 @@ struct SearchTemplate {
   }
   int total = 0;
 
-  // With the patch whose top-left pixel is given.
+  // Correlation with the patch whose top-left pixel is `corner`.
   [[nodiscard]] float correlation(const std::uint8_t* corner, int stride) const {
     int sum = 0;
     int squares = 0;
@@ -118,7 +118,7 @@ StereoDepth::StereoDepth(const Rig& rig, const StereoDepthSettings& settings)
   }
 }
 
-// Offsets in camera 0 to offsets in camera 1, for a patch facing the ray at that distance.
+// `warp` maps offsets in camera 0 to offsets in camera 1, for a patch at that distance, square to the ray.
 bool StereoDepth::warpAt(const Eigen::Vector2d& pixel, double inverse_depth, Eigen::Matrix2d& warp) const {
   for (int axis = 0; axis < 2; ++axis) {
     std::array<Eigen::Vector2d, 2> end;
@@ -288,7 +288,7 @@ bool StereoDepth::inverseDepthOf(const Eigen::Vector3d& bearing, const Match& ma
   sigma = settings_.pixel_sigma / moves.norm();
   if (!(miss.norm() < settings_.epipolar_gate)) return false;
   if (inverse_depth < -kBeyondInfinity * sigma || inverse_depth > 1.5 / settings_.min_distance) return false;
-  // At or beyond infinity: as far as can be told, with the same noise.
+  // At or beyond infinity: a tiny inverse distance, with the same sigma.
   inverse_depth = std::max(inverse_depth, 1e-6);
   return std::isfinite(sigma);
 }

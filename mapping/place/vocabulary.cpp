@@ -43,7 +43,7 @@ constexpr Status refused(const char* what) { return {StatusCode::kInvalidInput, 
 const Vocabulary& Vocabulary::shipped() {
   static const Vocabulary kShipped = [] {
     Vocabulary vocabulary;
-    (void)vocabulary.load(shippedVocabularyBytes());  // a test loads it
+    (void)vocabulary.load(shippedVocabularyBytes());  // a test checks that this succeeds
     return vocabulary;
   }();
   return kShipped;
@@ -56,7 +56,7 @@ void Vocabulary::clear() {
   depth_ = 0;
 }
 
-// Leaves get their words; the depth is counted level by level, since nodes are breadth first.
+// Numbers the leaves as words and counts the levels. Nodes must be in breadth-first order.
 Status Vocabulary::number() {
   std::size_t level_end = 1;
   depth_ = 0;

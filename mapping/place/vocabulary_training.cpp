@@ -27,7 +27,7 @@ class Tree {
  private:
   using Members = std::span<std::uint32_t>;
 
-  // Each next centre is drawn with a chance in proportion to the squared distance to the nearest one so far.
+  // Draws each next centre with a probability proportional to the squared distance to the nearest one so far.
   std::vector<Descriptor> firstCentres(Members members) {
     std::vector<Descriptor> centres = {
         all_[members[random_.below(static_cast<std::uint32_t>(members.size()))]]};
@@ -138,7 +138,7 @@ Status trainVocabulary(std::span<const Descriptor> descriptors, std::span<const 
     return {StatusCode::kInvalidInput, "the images' ends do not fit the descriptors"};
   }
   std::vector<VocabularyNode> nodes = Tree(descriptors, settings).grow();
-  // The weights need the words: a first tree with weights of 1 tells which node's word is which.
+  // Weights need the words of the descriptors: assemble the tree with weights of 1 first.
   for (VocabularyNode& node : nodes) node.weight = 1;
   if (const Status status = vocabulary.assemble(nodes); !status.ok()) return status;
   std::vector<std::size_t> images_with(vocabulary.words(), 0);
