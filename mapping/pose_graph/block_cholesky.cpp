@@ -11,10 +11,10 @@ using Eigen::Index;
 using Front = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 using ConstFront = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
-// Fronts with at most so many columns to eliminate are worked column by column: Eigen's blocked kernels would
-// spend more on packing than on arithmetic.
-constexpr Index kNarrow = 12;
-constexpr Index kLow = 48;  // and at most so many rows in all
+// Small fronts are eliminated column by column, because Eigen's blocked kernels would spend more on packing
+// than on arithmetic.
+constexpr Index kNarrow = 12;  // columns to eliminate, at most
+constexpr Index kLow = 48;     // rows in all, at most
 
 /// Right-looking elimination of the first `columns` of a front kept in two parts: the panel (height x
 /// columns) and the update (lower triangle of the rows below).
@@ -48,7 +48,7 @@ bool eliminateWide(double* panel, Index height, Index columns, double* update) {
   Front top(panel, columns, columns, Eigen::OuterStride<>(height));
   Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>> top_ref(top);
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>> llt(top_ref);
-  // Eigen's takes NaN for a pivot.
+  // Eigen accepts NaN as a pivot.
   if (llt.info() != Eigen::Success || !(top.diagonal().array() > 0).all()) return false;
   if (rows == 0) return true;
   Front bottom(panel + columns, rows, columns, Eigen::OuterStride<>(height));

@@ -24,9 +24,9 @@ struct FrontDraft {
 
 namespace {
 
-// A child is merged into its parent while the merged node has at most so many columns and its zeros are at
-// most this share of its blocks. Few wide fronts beat many narrow ones until the zeros cost more than they
-// save.
+// A child is merged into its parent if the zeros of the merged node are at most this share of its blocks; the
+// first rule with enough columns applies. Few wide fronts beat many narrow ones until the zeros cost more
+// than they save.
 struct Relaxation {
   std::uint32_t columns;
   double zeros;
@@ -34,9 +34,9 @@ struct Relaxation {
 constexpr Relaxation kRelaxation[] = {
     {2, 0.5}, {8, 0.25}, {16, 0.1}, {std::numeric_limits<std::uint32_t>::max(), 0.05}};
 
-// Block multiplications per block above which nested dissection is tried, too. Below, it costs more time than
-// it saves: on the public graphs it takes 2 to 4 us a block and saves a third of the work on spheres and tori
-// (1400 to 2200 per block), a tenth or nothing on all others (below 800).
+// Nested dissection is tried, too, above this number of block multiplications per block. Below, it costs more
+// time than it saves: on the public graphs it takes 2 to 4 us a block and saves a third of the work on
+// spheres and tori (1400 to 2200 per block), a tenth or nothing on all others (below 800).
 constexpr double kWorthDissecting = 1000;
 
 /// Compressed lists: of item k, values[begin[k]] to values[begin[k + 1] - 1].
@@ -147,7 +147,7 @@ Drafts findSupernodes(std::uint32_t blocks, const Lists& below, std::span<const 
       const FrontDraft& node = drafts.nodes[node_of[child]];
       for (std::uint32_t k = 0; k < node.rows; ++k) take(drafts.rows[node.rows_begin + k]);
     }
-    // One child whose rows are this column and its rows: the same supernode goes on.
+    // If the only child has exactly this column and its rows as rows, its supernode continues.
     if (children.of(column).size() == 1) {
       const std::uint32_t child = children.of(column)[0];
       FrontDraft& node = drafts.nodes[node_of[child]];

@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-/// Loops of a chance that differs by less than this factor speak for each other.
+/// Loops are of similar chance if their chances differ by less than this factor.
 constexpr double kNear = 10;
 
 }  // namespace

@@ -9,13 +9,13 @@
 namespace swiftlet {
 namespace {
 
-// Of the largest diagonal entry: keeps what edges do not determine (information of rank below full) at its
-// place, far below what they do.
+// Damping as a share of the largest diagonal entry. It holds directions that edges do not determine
+// (information without full rank) in place and is negligible for the others.
 constexpr double kRelativeDamping = 1e-12;
 
 double rotationWeight(const RelativePose<SE2>& edge) { return edge.information(0, 0); }
 
-/// Of an isotropic rotation error with the same mean variance; where a direction has no information, of the
+/// kappa of an isotropic rotation error with the same mean variance. If a direction has no information, the
 /// mean information, so that the edge is not lost.
 double rotationWeight(const RelativePose<SE3>& edge) {
   const Eigen::Matrix3d information = edge.information.topLeftCorner<3, 3>();
@@ -29,11 +29,11 @@ double rotationWeight(const RelativePose<SE3>& edge) {
 template <int kSpace>
 using Square = Eigen::Matrix<double, kSpace, kSpace>;
 
-/// The measured rotation as it acts on what is solved for: x_to = M x_from.
+/// The measured rotation M between the unknowns: x_to = M x_from.
 Square<2> relation(const SE2& measured) { return measured.R(); }
 Square<3> relation(const SE3& measured) { return measured.R().transpose(); }
 
-/// The columns solved for: the plane's rotation as the image of the x axis, the space's transposed.
+/// The unknowns: in the plane the image of the x axis, in space the transposed rotation.
 Eigen::Vector2d unknownsOf(const SE2& pose) { return {std::cos(pose.angle), std::sin(pose.angle)}; }
 Eigen::Matrix3d unknownsOf(const SE3& pose) { return pose.R().transpose(); }
 
@@ -107,7 +107,7 @@ bool ChordalStart<Pose>::solvePositions(std::span<const RelativePose<Pose>> edge
   constexpr int kTurn = PoseSpace<Pose>::kRotationDof;
   matrix_.reset(layout.unknowns, layout.pairs.size());
   solution_.setZero(static_cast<Eigen::Index>(layout.unknowns) * kSpace, 1);
-  // Linear in the positions, so one step from anywhere is the minimum: from the unknown ones at zero.
+  // The problem is linear in the positions, so one step from any start, here zero, reaches the minimum.
   for (std::size_t k = 0; k < poses.size(); ++k) {
     if (layout.unknown[k] != GraphLayout::kHeld) poses[k].translation.setZero();
   }

@@ -10,7 +10,7 @@ namespace {
 constexpr std::string_view kBlank = " \t\r\v\f";
 constexpr std::size_t kShownLength = 40;
 
-/// The whole word as a number; a leading + is taken as C's readers do.
+/// Reads the whole word as a number; accepts a leading +, as C's readers do.
 template <typename Number>
 bool parse(std::string_view word, Number& out) {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);

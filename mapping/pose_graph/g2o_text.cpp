@@ -45,7 +45,7 @@ struct Kinds<SE3> {
 template <typename Pose>
 constexpr int kDof = PoseSpace<Pose>::kDof;
 
-/// Information of the text's error times this is that of memory's, for two places in memory.
+/// Factor from the text's information to memory's, for entry (a, b) in memory.
 template <typename Pose>
 double informationScale(int a, int b) {
   constexpr int kTurns = PoseSpace<Pose>::kRotationDof;

@@ -6,7 +6,7 @@
 namespace swiftlet {
 namespace {
 
-/// Loops that were left out at the start stay marked by this weight while mu grows.
+/// Weight of loops that were left out at the start; it stays while mu grows.
 constexpr double kOut = 0;
 
 double graduatedWeight(double chi_squared, double limit, double mu) {
@@ -19,14 +19,14 @@ double graduatedWeight(double chi_squared, double limit, double mu) {
   return std::sqrt(limit * mu * (mu + 1) / chi_squared) - mu;
 }
 
-/// A loop that has reached 0 while mu grows may come back: a tiny weight keeps it apart from those left out.
+/// Weight of loops that reach 0 while mu grows. They may return, unlike those left out at the start.
 constexpr double kAlmostOut = 1e-12;
 
 bool decided(std::span<const double> weights) {
   return std::all_of(weights.begin(), weights.end(), [](double w) { return w <= kAlmostOut || w == 1; });
 }
 
-/// In or out by the limit; false when nothing changed.
+/// Sets each weight to 1 or 0 by the limit. False if nothing changed.
 bool settle(double limit, std::span<double> weights, std::span<const double> chi_squared) {
   bool changed = false;
   for (std::size_t k = 0; k < weights.size(); ++k) {
@@ -61,7 +61,7 @@ bool GraduatedSelection::next(std::span<const double> chi_squared, std::span<dou
       if (weights[k] > kOut) worst = std::max(worst, chi_squared[k]);
     }
     stage_ = worst > limit ? Stage::kGrowing : Stage::kSettling;
-    // 2 worst > limit: mu starts above 0 and where the surrogate is convex.
+    // If worst > limit, mu is above 0, and the surrogate is convex there; otherwise mu is not used.
     mu_ = limit / (2 * worst - limit);
   } else if (stage_ == Stage::kGrowing) {
     mu_ *= settings_.growth;

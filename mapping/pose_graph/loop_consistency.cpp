@@ -9,7 +9,7 @@
 namespace swiftlet {
 namespace {
 
-/// Large enough that no test looks at the direction, small enough for a Cholesky factor in doubles.
+/// Large enough that tests ignore the direction, small enough for a Cholesky factor in doubles.
 constexpr double kUnknownVarianceRatio = 1e9;
 
 /// Volumes of the unit ball of 3 and 6 dimensions, and of all rotations as vectors of angles near the

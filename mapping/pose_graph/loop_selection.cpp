@@ -147,7 +147,7 @@ std::uint32_t LoopSelection<Pose>::groupOf(const ChainedLoop<Pose>& chained) {
     }
   }
   for (std::uint32_t k = 0; k < groups_.size(); ++k) {
-    // All loops of it gave way to others.
+    // Reuse a group without loops.
     const auto uses = [&](const Held& held) { return held.group == k; };
     if (groups_[k].size == 0 && std::none_of(held_.begin(), held_.end(), uses)) {
       groups_[k] = {chained.from_component, chained.to_component, 0, true};
@@ -264,7 +264,7 @@ void LoopSelection<Pose>::searchGroup(std::uint32_t group, std::uint32_t max_nod
   weighRival(group, max_nodes);
 }
 
-/// The largest set of those that speak against the group's: of loops that agree with less than half of it.
+/// Size of the largest set that contradicts the group's, among loops that agree with less than half of it.
 template <typename Pose>
 void LoopSelection<Pose>::weighRival(std::uint32_t group, std::uint32_t max_nodes) {
   Group& ties = groups_[group];

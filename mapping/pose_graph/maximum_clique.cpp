@@ -49,7 +49,7 @@ CliqueResult MaximumClique::search(const ConsistencyGraph& graph, ConstBitSet ca
   }
   numberConflicts(graph);
   const std::uint32_t free = countBits(free_);
-  // Of the numbered candidates as many as are missing.
+  // How many numbered candidates are needed.
   const std::uint32_t target = at_least + 1 > free ? at_least + 1 - free : 0;
   CliqueResult result;
   if (numbers_.empty()) {
@@ -145,14 +145,14 @@ void MaximumClique::bringBack(BitSet set) {
   }
 }
 
-/// Takes and drops what is safe; false when `target` cannot be reached.
+/// Takes and drops candidates where this is safe. False if `target` cannot be reached.
 bool MaximumClique::reduce(BitSet open, BitSet taken, std::uint32_t& size, std::uint32_t target) {
   std::uint32_t left = countBits(open);
   for (bool changed = true; changed;) {
     changed = false;
     forEachBit(ConstBitSet(open), [&](std::uint32_t k) {
       if (!testBit(open, k)) {
-        return;  // gone since the word was read
+        return;  // removed since the word was read
       }
       const std::uint32_t count = countBoth(conflicts(k), open);
       if (count <= 1) {
@@ -175,7 +175,7 @@ bool MaximumClique::reduce(BitSet open, BitSet taken, std::uint32_t& size, std::
   return true;
 }
 
-/// Groups of candidates that all conflict with each other, until there are `enough`.
+/// Number of groups of mutually conflicting candidates, counted up to `enough`.
 std::uint32_t MaximumClique::colours(ConstBitSet open, std::uint32_t enough) {
   const BitSet left{scratch_.data(), words_};
   const BitSet group{colour_.data(), words_};

@@ -45,7 +45,7 @@ class MaximumClique {
   CliqueResult search(const ConsistencyGraph& graph, ConstBitSet candidates, std::uint32_t at_least,
                       std::uint32_t max_nodes, BitSet best);
 
-  /// Above the number of nodes that a step may visit.
+  /// Larger than the number of nodes that a step may visit.
   static constexpr std::uint32_t kDefaultDepth = 512;
 
  private:

@@ -63,7 +63,7 @@ class OdometryChain {
   void erase(std::uint32_t k) { nodes_.erase(nodes_.begin() + k); }
   void clear() { nodes_.clear(); }
 
-  /// For flights at one height or along a line: false loops may lie beside them.
+  /// Flights at one height or along a line have thin boxes, but false loops may lead beside them.
   static constexpr double kThinnest = 0.1;
 
  private:

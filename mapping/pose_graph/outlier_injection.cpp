@@ -12,7 +12,7 @@
 namespace swiftlet {
 namespace {
 
-/// Poses apart of a false loop's ends at least: a neighbour would be an odometry edge.
+/// Least number of poses between a false loop's ends; neighbours would be joined by an odometry edge.
 constexpr std::uint32_t kMinGap = 2;
 
 SE2 randomPose(const Eigen::Vector2d& low, const Eigen::Vector2d& high, Random& random) {
@@ -42,7 +42,7 @@ Pose randomNoise(const PoseMatrix<Pose>& information, Random& random) {
   for (int k = 0; k < xi.size(); ++k) {
     const double normal = random.normal();
     const double eigenvalue = eigen.eigenvalues()[k];
-    // As much as a reader's clamping of indefinite information leaves of rounding.
+    // Smaller eigenvalues are rounding that remains after a reader has clamped indefinite information.
     if (eigenvalue > 1e-12 * eigen.eigenvalues().maxCoeff()) {
       xi += normal / std::sqrt(eigenvalue) * eigen.eigenvectors().col(k);
     }
@@ -50,7 +50,7 @@ Pose randomNoise(const PoseMatrix<Pose>& information, Random& random) {
   return poseExp(xi);
 }
 
-/// T_first_second along the odometry edges, by the graph's poses where one is missing.
+/// Steps between neighbouring poses from the odometry edges; where one is missing, from the graph's poses.
 template <typename Pose>
 struct Odometry {
   std::vector<Pose> step;  ///< T_k_k+1
@@ -95,11 +95,11 @@ struct Injector {
     return graph.edges[loops[random.below(static_cast<std::uint32_t>(loops.size()))]].information;
   }
 
-  /// Two rows of `length` poses that do not overlap: the first pose of each.
+  /// Draws two rows of `length` poses that do not overlap. Returns the first pose of each.
   std::pair<std::uint32_t, std::uint32_t> drawRows(std::uint32_t length) {
     const auto starts = static_cast<std::uint32_t>(graph.poses.size()) - length + 1;
     const std::uint32_t gap = std::max(kMinGap, length);
-    // Pairs (i, j), j >= i + gap, each as likely: two different numbers of fewer, the upper moved up.
+    // Uniform over pairs (i, j) with j >= i + gap: two different numbers below `numbers`, the larger shifted.
     const std::uint32_t numbers = starts - gap + 1;
     const std::uint32_t a = random.below(numbers);
     const std::uint32_t other = random.below(numbers - 1);
@@ -125,7 +125,7 @@ struct Injector {
 }  // namespace
 
 std::uint32_t outlierCount(std::uint32_t true_loops, double share) {
-  const double inside = std::clamp(share, 0.0, 0.999);  // 0.999: a thousand false to a true one
+  const double inside = std::clamp(share, 0.0, 0.999);  // 0.999: a thousand false loops per true one
   return static_cast<std::uint32_t>(std::lround(true_loops * inside / (1 - inside)));
 }
 

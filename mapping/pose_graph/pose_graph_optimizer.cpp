@@ -9,18 +9,18 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kNothingToGain = 1e-9;  // a cost: the given poses fit, no start could be better
-constexpr double kFirstDamping = 1e-9;   // of the diagonal, where the undamped equations have no factor
+constexpr double kNothingToGain = 1e-9;  // cost below which the given poses fit and are kept
+constexpr double kFirstDamping = 1e-9;   // share of the diagonal, if undamped equations have no factor
 constexpr double kDampingUp = 100;
 constexpr int kDampingTries = 6;
-constexpr double kAccepted = 1e-4;  // of the predicted decrease
+constexpr double kAccepted = 1e-4;  // these three: share of the predicted decrease
 constexpr double kPoor = 0.25;
 constexpr double kGood = 0.75;
-constexpr double kShrink = 0.5;                 // of the region after a step that was not taken
-constexpr double kGrow = 3;                     // and after a good one
+constexpr double kShrink = 0.5;                 // radius over the length of a rejected or poor step
+constexpr double kGrow = 3;                     // radius over the length of a good step, at least
 constexpr double kInformationAsymmetry = 1e-9;  // of the largest entry
 
-/// Of an anchor's own diagonal: it holds whatever the poses pull at.
+/// Stiffness of an anchor relative to its own diagonal: large enough to hold against all edges.
 constexpr double kAnchorStiffness = 1e6;
 
 /// The map's vertical in the body's axes.
@@ -236,7 +236,7 @@ void PoseGraphOptimizer<Pose>::linearize() {
     scale_.segment<kDof>(static_cast<Eigen::Index>(k) * kDof) = H_.diagonal[k].diagonal();
     largest = std::max(largest, H_.diagonal[k].diagonal().maxCoeff());
   }
-  // What no edge determines takes part with a small scale, so that nothing is divided by zero.
+  // Unknowns that no edge determines get a small scale, to avoid divisions by zero.
   constexpr double kLeastScale = 1e-12;
   const double least = largest > 0 ? kLeastScale * largest : 1.0;
   scale_ = scale_.cwiseMax(least).cwiseSqrt();
@@ -256,7 +256,8 @@ void PoseGraphOptimizer<Pose>::linearizeGravity() {
   }
 }
 
-/// Heading and position of a whole piece cost nothing: what holds them at its first pose bears no load.
+/// Holds heading and position of the anchors. The cost does not depend on those of a whole piece, so holding
+/// them does not change the solution's shape.
 template <typename Pose>
 void PoseGraphOptimizer<Pose>::anchor() {
   for (const std::uint32_t k : layout_.anchors) {
@@ -269,7 +270,7 @@ void PoseGraphOptimizer<Pose>::anchor() {
   }
 }
 
-/// Only the Gauss-Newton step knows of itself that anchors stay.
+/// Removes heading and position of the anchors from a step. Not needed for Gauss-Newton steps: H holds them.
 template <typename Pose>
 void PoseGraphOptimizer<Pose>::stayAnchored(Eigen::VectorXd& step) const {
   for (const std::uint32_t k : layout_.anchors) {
@@ -379,7 +380,7 @@ Status PoseGraphOptimizer<Pose>::iterate(const OptimizeEffort& effort, OptimizeR
       return okStatus();
     }
     ++report.rejected;
-    // Neither the model nor the cost can tell the two apart any more.
+    // The predicted decrease is below the tolerance: a shorter step cannot gain more.
     if (predicted <= effort.tolerance * report.final_cost || !(predicted > 0)) break;
     radius_ = kShrink * std::min(length, radius_);
   }
@@ -411,7 +412,7 @@ Status PoseGraphOptimizer<Pose>::start(StartReport& report, bool anew) {
   if (report.given_cost <= kNothingToGain) return okStatus();
   if (const Status status = arrange(); !status.ok()) return status;
   std::vector<Pose> poses = graph_.poses;
-  if (!layout_.anchors.empty()) return okStatus();  // it needs a held pose in each piece
+  if (!layout_.anchors.empty()) return okStatus();  // ChordalStart needs a held pose in each piece
   ChordalStart<Pose> chordal;
   if (!chordal.run(graph_.edges, weights_, layout_, poses).ok()) return okStatus();
   report.chordal_cost = costAt(poses);

@@ -82,8 +82,9 @@ class PoseGraphOptimizer {
   /// Removes all edges from index `edges` on, and all poses from index `poses` on.
   Status truncate(std::size_t poses, std::size_t edges);
 
-  /// Keeps the present poses or those of ChordalStart, whichever cost less (docs/pose_graph.md section 3);
-  /// with `anew` always those of ChordalStart. kNumerical if neither is available.
+  /// Takes the poses of ChordalStart if they cost less than the present ones (docs/pose_graph.md section 3),
+  /// or, with `anew`, even if they cost more. Keeps the present ones if these fit, if ChordalStart fails, or
+  /// if a piece of the graph has no held pose. kNotReady and kCapacityReached as for optimize().
   Status start(StartReport& report, bool anew = false);
 
   /// kNotReady without poses; kNumerical if the normal equations cannot be factored even with damping;

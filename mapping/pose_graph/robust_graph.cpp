@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kFitTail = 1e-3;
 
-/// As far as the search for the largest set helps on the public graphs (docs/pose_graph.md).
+/// More nodes do not improve the largest set on the public graphs (docs/pose_graph.md).
 constexpr std::uint32_t kNodes = 200;
 
 /// Covariances of relative poses on the solved graph: 10 ms each on the largest public ones.
@@ -19,20 +19,20 @@ constexpr std::uint32_t kReconsidered = 300;
 
 constexpr int kSolutionIterations = 100;
 
-/// While weights change a rough solution will do.
+/// While weights change, rough solutions suffice.
 constexpr int kGraduatedIterations = 5;
 constexpr double kGraduatedTolerance = 1e-4;
 
-/// Of the cost: what another minimum must be lower by. So the search for lower ones ends.
+/// Another minimum must be lower by at least this share of the cost, so that settleAnew() ends.
 constexpr double kWorthwhile = 1e-3;
 
-/// Sigmas of its tilt that a pose may lean before the graph is solved for that alone.
+/// A pose that leans by more than this many sigmas of its tilt starts a solution, even without a loop.
 constexpr double kLeaning = 3;
 
-/// Logarithm of a chance that no limit reaches.
+/// Logarithm of a chance above every limit.
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
-/// A loop and the solution, round.
+/// Error of the cycle of a loop and the solution.
 template <typename Pose>
 PoseVector<Pose> cycleError(const OdometryChain<Pose>& chain, const ChainedLoop<Pose>& loop,
                             const std::vector<Pose>& solved) {
@@ -58,7 +58,7 @@ RobustGraph<Pose>::RobustGraph(const RobustGraphLimits& limits, const RobustGrap
     : limits_(limits),
       settings_(settings),
       selection_({limits.poses, limits.loops}, settings.selection),
-      // Of a loop that gave way to another the edge stays, without weight, until the graph is built anew.
+      // The edge of a replaced loop stays, with weight 0, until the graph is rebuilt.
       optimizer_({limits.poses, limits.poses + 2 * std::size_t{limits.loops}, 0}),
       members_(limits.loops),
       graduated_(settings.graduated),
@@ -110,7 +110,7 @@ Status RobustGraph<Pose>::addPose(const RelativePose<Pose>& odometry, const Tilt
   return status;
 }
 
-/// Further from the vertical than its tilt allows.
+/// Whether the pose is farther from the vertical than its tilt allows.
 template <typename Pose>
 bool RobustGraph<Pose>::leans(std::uint32_t k) const {
   if constexpr (PoseSpace<Pose>::kDof == 6) {
@@ -154,7 +154,7 @@ Status RobustGraph<Pose>::release(std::uint32_t id) {
   return status;
 }
 
-/// Poses and odometry to scratch_; a pose left out is bridged by the product of its two steps.
+/// Copies poses and odometry to scratch_. A pose left out is bridged by the product of its two steps.
 template <typename Pose>
 void RobustGraph<Pose>::gather(std::uint32_t left_out) {
   const OdometryChain<Pose>& chain = odometry();
@@ -177,7 +177,7 @@ void RobustGraph<Pose>::gather(std::uint32_t left_out) {
   }
 }
 
-/// The optimizer's graph from what gather() found and the loops that take part.
+/// Builds the optimizer's graph from scratch_ (filled by gather()) and the loops that take part.
 template <typename Pose>
 Status RobustGraph<Pose>::assemble() {
   step_edges_.assign(scratch_.poses.size(), kNoEdge);
@@ -227,7 +227,7 @@ void RobustGraph<Pose>::setWeight(std::uint32_t id, double weight) {
   if (members_[id].edge != kNoEdge) static_cast<void>(optimizer_.setWeight(members_[id].edge, weight));
 }
 
-/// The loop's place is another's now.
+/// Clears the role of the loop that had this id before.
 template <typename Pose>
 void RobustGraph<Pose>::forget(std::uint32_t id) {
   setWeight(id, 0);
@@ -253,20 +253,20 @@ Status RobustGraph<Pose>::take(std::uint32_t id) {
   return status;
 }
 
-/// Whatever was at work begins again with this, but for graduated weights, which come to their end first.
+/// Continues with `phase`, whatever was in progress. Only 4 is completed first.
 template <typename Pose>
 void RobustGraph<Pose>::restart(Phase phase) {
   if (phase_ == Phase::kGraduate) {
     behind_ = true;
     return;
   }
-  // Asking follows solving.
+  // kAskOwn follows a solution anyway.
   if (phase == Phase::kAskOwn && (phase_ == Phase::kSolve || phase_ == Phase::kSolveAgain)) return;
   phase_ = phase;
   solve_iterations_ = 0;
 }
 
-/// What the selection says now is what takes part.
+/// Updates the loops that take part after a change of the selection.
 template <typename Pose>
 void RobustGraph<Pose>::follow() {
   bool changed = false;
@@ -277,12 +277,12 @@ void RobustGraph<Pose>::follow() {
     const bool chosen = verdict == LoopVerdict::kSelected || member.back;
     if (chosen == member.taken) continue;
     if (phase_ == Phase::kGraduate && chosen) {
-      behind_ = true;  // takes part in the next
+      behind_ = true;  // takes part after 4
       continue;
     }
     changed = changed || chosen || member.weight > 0;
     if (chosen) {
-      static_cast<void>(take(id));  // refused only where the selection would have refused it
+      static_cast<void>(take(id));  // fails only for loops that the selection would have refused
     } else {
       setWeight(id, 0);
       member.taken = false;
@@ -329,7 +329,7 @@ Status RobustGraph<Pose>::settle(int iterations, bool& moved) {
         break;
     }
     if (!status.ok()) {
-      // Weights that were on their way are not left behind.
+      // Do not leave intermediate weights in the optimizer.
       for (std::uint32_t id = 0; id < loops(); ++id) setWeight(id, members_[id].weight);
       phase_ = Phase::kRest;
       behind_ = false;
@@ -363,13 +363,13 @@ template <typename Pose>
 void RobustGraph<Pose>::measureFits() {
   for (std::size_t k = 0; k < graduated_ids_.size(); ++k) {
     const RelativePose<Pose>& edge = loop(graduated_ids_[k]);
-    // One given up meanwhile takes no part.
+    // Loops released meanwhile do not take part.
     chi_squared_[k] =
         members_[graduated_ids_[k]].taken ? 2 * edgeCost(edge, pose(edge.from), pose(edge.to)) : kNever;
   }
 }
 
-/// 4 begins at a solution; where all loops fit it is its end as well.
+/// Starts 4 from a solution. If all loops fit, 4 ends at once.
 template <typename Pose>
 void RobustGraph<Pose>::beginGraduated() {
   graduated_ids_.clear();
@@ -420,7 +420,7 @@ void RobustGraph<Pose>::endGraduated() {
   follow();
 }
 
-/// Between two components a loop or two fit whatever they say.
+/// Drops loops between two components if fewer than min_between are left: one or two always fit.
 template <typename Pose>
 void RobustGraph<Pose>::dropThinTies() {
   const auto ends = [&](std::uint32_t id) {
@@ -440,14 +440,14 @@ void RobustGraph<Pose>::dropThinTies() {
   }
 }
 
-/// Loops that do not take part, and may: those between two components have no cycle of their own.
+/// Whether 5 tests the loop: it does not take part yet. Loops between components have no cycle of their own.
 template <typename Pose>
 bool RobustGraph<Pose>::isOpen(std::uint32_t id) const {
   return !members_[id].taken && selection_.verdict(id) != LoopVerdict::kReleased &&
          selection_.chained(id).withinComponent();
 }
 
-/// Those that fit with their own covariance first: they bend the solution least, and it knows more then.
+/// First test of 5, for all open loops. Those that pass change the solution least and make it more certain.
 template <typename Pose>
 void RobustGraph<Pose>::askOwn() {
   open_.clear();
@@ -465,7 +465,7 @@ void RobustGraph<Pose>::askOwn() {
   orderOpen();
 }
 
-/// Those first that contradict fewest of the sets.
+/// Sorts the open loops by their number of conflicts with the loops of the sets.
 template <typename Pose>
 void RobustGraph<Pose>::orderOpen() {
   std::fill(set_.begin(), set_.end(), 0);
@@ -485,7 +485,7 @@ void RobustGraph<Pose>::orderOpen() {
   covariances_ = 0;
 }
 
-/// Up to the next loop that a covariance must be asked for.
+/// Second test of 5, up to the next loop that needs a covariance of the solution.
 template <typename Pose>
 void RobustGraph<Pose>::askNext(int& iterations) {
   const double limit = settings_.selection.gate_chi_squared;
@@ -494,8 +494,8 @@ void RobustGraph<Pose>::askNext(int& iterations) {
     if (!isOpen(open.id)) continue;
     const ChainedLoop<Pose>& chained = selection_.chained(open.id);
     const PoseVector<Pose> error = cycleError(odometry(), chained, graph().poses);
-    // The solution knows the relative pose better than the odometry alone: what fails this would fail the
-    // test.
+    // The solution's covariance is smaller than that of the odometry alone: a loop that fails with the latter
+    // would fail the test.
     const PoseMatrix<Pose> loose = chained.covariance + odometry().covariance(chained.from, chained.to);
     if (!(cycleTest<Pose>(loose, error).chi_squared <= limit)) continue;
     ++covariances_;
@@ -509,14 +509,14 @@ void RobustGraph<Pose>::askNext(int& iterations) {
   if (!believeFits()) phase_ = Phase::kRest;
 }
 
-/// Of the open loops those that fit, and not by chance, come back. True where there are such.
+/// Accepts the open loops that fit, if random loops would be unlikely to. True if there are any.
 template <typename Pose>
 bool RobustGraph<Pose>::believeFits() {
   log_chances_.clear();
   for (const OpenLoop& open : open_) {
     if (open.log_chance < kNever) log_chances_.push_back(open.log_chance);
   }
-  // Those that the odometry spoke against count too: how well one agrees with it was seen before.
+  // Loops that failed the gate count as tested, too: leaving them out would use a result already seen.
   std::size_t left = 0;
   for (std::uint32_t id = 0; id < loops(); ++id) {
     left += !believed(id) && selection_.verdict(id) != LoopVerdict::kReleased ? 1 : 0;
@@ -524,7 +524,7 @@ bool RobustGraph<Pose>::believeFits() {
   const double limit = std::min(std::log(settings_.selection.max_gate_chance),
                                 logDiscoveryLimit(settings_.selection.max_false, left, log_chances_));
   std::uint32_t count = 0;
-  // Added only now: a new edge would cost a new factor for the next covariance.
+  // Added only now, because a new edge would require a new factor for the next covariance.
   for (const OpenLoop& open : open_) {
     if (!(open.log_chance <= limit) || !isOpen(open.id)) continue;
     members_[open.id].back = take(open.id).ok();
@@ -552,7 +552,7 @@ Status RobustGraph<Pose>::settleAnew() {
     StartReport start;
     Status status = optimizer_.start(start, true);
     if (!status.ok() || start.choice == StartChoice::kGiven) return status;
-    // Dropped ones are as good as those that were not selected.
+    // Treat dropped loops as not selected.
     for (std::uint32_t id = 0; id < loops(); ++id) {
       if (dropped(members_[id]) && selection_.chained(id).withinComponent()) members_[id].taken = false;
     }

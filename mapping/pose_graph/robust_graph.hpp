@@ -22,8 +22,8 @@
 //
 // Gravity. A pose may have the odometry's tilt, which becomes a factor of the graph (gravity_factor.hpp), so
 // that a loop cannot tilt the map beyond what the odometry knows. The first pose of a piece with such poses
-// is held in heading and position only. A pose that leans against its own tilt starts 3 even without a loop:
-// an odometry that starts in the air finds the vertical some seconds later.
+// is held in heading and position only. If a pose contradicts its own tilt, 3 starts even without a loop: an
+// odometry that starts in the air finds the vertical some seconds later.
 //
 // Frames: T_map_body; the first pose of a component is given, others follow the odometry. Memory: that of
 // LoopSelection and 0.9 KiB per loop and pose, reserved by the constructor except for the optimizer's factor.
@@ -72,7 +72,7 @@ class RobustGraph {
   Status beginComponent(const Pose& T_map_body, const Tilt& tilt = {});
   /// Adds pose number size(). `odometry` joins it and the one before, in either direction.
   Status addPose(const RelativePose<Pose>& odometry, const Tilt& tilt = {});
-  /// The pose does not move.
+  /// Holds the pose: solutions do not move it.
   Status hold(std::uint32_t pose) {
     if (pose < size()) known_[pose].held = true;
     return optimizer_.hold(pose, true);

@@ -1,5 +1,5 @@
 #pragma once
-// Counters of RobustGraph, for those who report them without the graph. Numbers: robust_graph.hpp.
+// Counters of RobustGraph, for code that reports them without the graph. Step numbers: robust_graph.hpp.
 
 #include <cstdint>
 

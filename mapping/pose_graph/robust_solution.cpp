@@ -13,7 +13,7 @@ Status copyPoses(const PoseGraph<Pose>& graph, const std::vector<std::uint32_t>&
   for (std::size_t k = 0; k < graph.poses.size(); ++k) {
     if (const Status status = addNextPose(graph, steps, robust); !status.ok()) return status;
   }
-  // A component lies where its first fixed pose is; each further one is where the graph has it.
+  // A component is placed by its first fixed pose. Further fixed poses stay where the graph has them.
   std::vector<std::optional<Pose>> T_graph_component(robust.odometry().components());
   for (const std::uint32_t pose : fixed) {
     if (pose >= robust.size()) return {StatusCode::kInvalidInput, "no such pose to hold"};
@@ -22,7 +22,7 @@ Status copyPoses(const PoseGraph<Pose>& graph, const std::vector<std::uint32_t>&
   }
   for (std::uint32_t k = 0; k < robust.size(); ++k) {
     const auto& T = T_graph_component[robust.odometry().component(k)];
-    // Also begins a solution where no loop does.
+    // setPose() also starts a solution if no loop does.
     if (const Status status = robust.setPose(k, T ? *T * robust.pose(k) : robust.pose(k)); !status.ok()) {
       return status;
     }
