@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-/// What is compared or written is of the stage's size.
+/// Whether all images of the output have the stage's size.
 bool fits(const DepthBuffer& out, std::size_t pixels) {
   return out.depth.size() == pixels && out.sigma.size() == pixels && out.intensity.size() == pixels &&
          out.labels.size() == pixels;

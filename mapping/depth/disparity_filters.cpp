@@ -112,7 +112,7 @@ std::uint16_t medianOfNine(std::array<std::uint16_t, 9> v) {
 
 }  // namespace
 
-// Plain loops that the compiler makes vectors of, but for the few pixels of holes.
+// Plain loops, which the compiler vectorizes, except for the few pixels of holes.
 void MedianFilter::filterRow(const std::uint16_t* above, const std::uint16_t* here,
                              const std::uint16_t* below, std::uint16_t* __restrict out, std::uint8_t* sigma,
                              int width) {
@@ -136,7 +136,7 @@ void MedianFilter::filterRow(const std::uint16_t* above, const std::uint16_t* he
     if (known[x] < kHoleNeighbours) continue;
     std::array<std::uint16_t, 9> nine{above[x - 1], above[x],     above[x + 1], here[x - 1], here[x],
                                       here[x + 1],  below[x - 1], below[x],     below[x + 1]};
-    // Those that are missing come last.
+    // Missing disparities come last.
     std::sort(nine.begin(), nine.end());
     if (nine[known[x] - std::size_t{1}] - nine[0] > kDisparitySteps) continue;
     out[x] = nine[(known[x] - std::size_t{1}) / 2];

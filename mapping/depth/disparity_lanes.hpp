@@ -238,7 +238,7 @@ using Native = Scalar;
 
 #endif
 
-/// Instantiates the kernels for both.
+/// Defined if `Native` differs from `Scalar`, so that kernels are instantiated for both.
 #ifdef SWIFTLET_SIMD_NATIVE
 #define SWIFTLET_DISPARITY_LANES_NATIVE
 #endif

@@ -10,7 +10,7 @@ namespace {
 constexpr int kFractionBits = 7;
 constexpr int kOne = 1 << kFractionBits;
 
-/// Whole pixel, with one to its right, and position in fractions.
+/// Whole pixel, at most the last but one, and position [1 / kOne px].
 std::pair<int, int> fixedPoint(double p, int size) {
   const int position = static_cast<int>(std::lround(std::clamp(p, 0.0, size - 1.0) * kOne));
   return {std::min(position >> kFractionBits, size - 2), position};

@@ -46,7 +46,7 @@ struct Costs {
   }
 };
 
-/// 255 where a pixel has no disparity beside: in the first lane, and in the last.
+/// 255 in the lane of a pixel's first or last disparity, which has no neighbour on one side.
 template <typename Lanes>
 struct EndMasks {
   EndMasks() {
@@ -61,7 +61,7 @@ struct EndMasks {
   typename Lanes::Bytes last;
 };
 
-/// A pixel's costs along a path, less their least, and the same one disparity on and one back.
+/// A pixel's costs along a path, less their least, and those of the disparities below and above.
 template <typename Lanes, int kVectors>
 struct Neighbours {
   Costs<Lanes, kVectors> same;
@@ -103,7 +103,7 @@ Costs<Lanes, kVectors> along(const Neighbours<Lanes, kVectors>& before, const Co
   return path;
 }
 
-/// Less their least: what the next pixel of the path takes.
+/// Costs less their least, as the next pixel of the path uses them.
 template <typename Lanes, int kVectors>
 Costs<Lanes, kVectors> relative(const Costs<Lanes, kVectors>& path) {
   const auto least = Lanes::spreadLeast(path.least());
@@ -131,8 +131,8 @@ Costs<Lanes, kVectors> matchingCosts(const MatchingRow& row, int x) {
   return costs;
 }
 
-/// Least sums and their disparities of the right image's pixels x - d, while x goes right: each pixel's
-/// moves up one lane a step, and leaves after the last.
+/// Least sums and their disparities of the right image's pixels x - d, while x rises. In each step the values
+/// of a pixel move up by one lane; after the last lane its disparity is final.
 template <typename Lanes, int kVectors>
 class RightView {
  public:

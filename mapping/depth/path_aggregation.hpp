@@ -35,7 +35,7 @@ struct MatchingRow {
   const std::uint8_t* grey = nullptr;         ///< left image; one more pixel at both ends
   const std::uint8_t* grey_before = nullptr;  ///< row of q, for a path across rows
   std::array<const std::uint8_t*, kCensusPlanes> left_signs{};
-  std::array<const std::uint8_t*, kCensusPlanes> right_signs{};  ///< mirrored; 32 kVectors bytes behind
+  std::array<const std::uint8_t*, kCensusPlanes> right_signs{};  ///< mirrored; 32 kVectors bytes more
 };
 
 /// Results per pixel of the row. The smallest of equal disparities wins.
@@ -49,8 +49,8 @@ struct DisparityChoice {
 };
 
 /// `costs` and `sums`: of a row, width x disparities. `neighbours`: costs along the path in the row of q,
-/// less the least of each pixel; replaced by those of this row. Zeros where a path begins. A byte before and
-/// after it is read.
+/// less the least of each pixel; zeros where a path begins. They are replaced by those of this row. One byte
+/// before and one after `neighbours` are read.
 ///
 /// Computes matching costs and the upward path (`grey_before`: the row below). If `costs` and `sums` are not
 /// null, they receive the costs, and the sums of the upward and the leftward path.

@@ -127,9 +127,9 @@ MatchingRow SemiGlobalMatcher::matchingRow(int y, int y_before) {
   return row;
 }
 
-// How far disparities are from true ones, from the least sum's lead over the next best that is no neighbour,
-// and from how steeply sums rise beside it. Fitted to errors below 3 px on the pairs with true disparity and
-// on rendered flights; docs/experiments/depth.md has the shares within one, two and three sigma.
+// Standard deviation of a disparity, from the least sum's lead over the next best that is no neighbour, and
+// from how steeply sums rise beside it. Fitted to errors below 3 px on the pairs with true disparity and on
+// rendered flights; docs/experiments/depth.md has the shares within one, two and three sigma.
 std::array<std::uint8_t, 64 * 64> SemiGlobalMatcher::makeSigmas() {
   constexpr double kFloor = 0.22;  // px, where all is clear
   constexpr double kDoubt = 0.85;  // px, added where another disparity is as good
@@ -146,8 +146,8 @@ std::array<std::uint8_t, 64 * 64> SemiGlobalMatcher::makeSigmas() {
 }
 
 // Sub-pixel by two lines of opposite slope through the three sums about the least (equiangular fit: the sums
-// of census costs rise linearly about their least; Shimizu, Okutomi, ICCV 2001). Sums fall off towards the
-// better neighbour.
+// of census costs rise linearly about their least; Shimizu, Okutomi, ICCV 2001). The offset is towards the
+// neighbour with the smaller sum.
 void SemiGlobalMatcher::refineRow(int disparities, std::uint16_t* __restrict disparity) const {
   const std::uint8_t* __restrict const whole = choice_.disparity;
   const std::uint8_t* __restrict const least = choice_.least;

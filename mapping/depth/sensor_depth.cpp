@@ -14,7 +14,7 @@ SensorDepth::SensorDepth(const PinholeIntrinsics& sensor, const SE3& T_body_sens
 
 DepthBuffer SensorDepth::makeBuffer() const { return DepthBuffer(sensor_); }
 
-// 0 where there is none.
+// 0 if there is no depth; counts the reason.
 float SensorDepth::depthOf(double z) {
   if (!std::isfinite(z)) {
     ++counters_.not_finite;

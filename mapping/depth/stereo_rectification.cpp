@@ -6,9 +6,9 @@
 namespace swiftlet {
 namespace {
 
-/// Cameras this close to each other have no baseline to speak of [m].
+/// Least baseline [m].
 constexpr double kLeastBaseline = 1e-3;
-/// Of a camera's axis to the rectified one: 60 degrees.
+/// Cosine of the largest angle between a camera's axis and the rectified one: 60 degrees.
 constexpr double kLeastCosine = 0.5;
 
 struct Field {
@@ -18,8 +18,8 @@ struct Field {
   double bottom = StereoRectification::kMaxFieldTangent;
 };
 
-// Takes off the field what the raw image's border does not reach. Rays as x/z, y/z in the rectified frame;
-// what lies at or behind 90 degrees is no border of a pinhole's field.
+// Reduces the field to what lies inside the raw image's border. Field: x/z and y/z in the rectified frame.
+// Border rays at 90 degrees or more are ignored, because a pinhole's field does not reach them.
 void cutToBorder(const CameraModel& camera, const Eigen::Matrix3d& R_rectified_cam, Field& field) {
   // The raw border pixel at (u, v); `edge` is the side of the field that it bounds.
   const auto cut = [&](double u, double v, double& edge, int axis, bool upper) {

@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-// Depth at which a pixel without one is looked for: the turn is most of what moves it.
+// Depth assumed for a pixel without one: the rotation moves it most.
 constexpr double kFar = 100;  // m
 constexpr int kRounds = 2;
 
@@ -40,7 +40,7 @@ Eigen::Vector3d UnrolledDepth::rayAt(std::size_t x, std::size_t y) const {
           (static_cast<double>(y) - camera_.cy) / camera_.fy, 1};
 }
 
-// The right image's point as it was when the left one's row was read.
+// Depth of a pixel, with the right image's point moved to the time when the left image's row was read.
 double UnrolledDepth::corrected(double z, std::size_t pixel, const CameraScan& scan) const {
   const auto width = static_cast<std::size_t>(camera_.width);
   const std::size_t x = pixel % width;

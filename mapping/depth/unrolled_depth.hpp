@@ -1,10 +1,11 @@
 #pragma once
 // Converts the depth image of a rolling shutter to the camera's pose at the middle row.
 //
-// Each pixel of the result searches the pixel that shows the same point: a point at its depth, moved to the
-// time when that row was read, found in two rounds. It takes that pixel's depth, transformed to the camera at
-// the middle row, with sigma, grey value and label. Nearest pixel, no interpolation; pixels that the motion
-// uncovers have no depth.
+// For each pixel of the result, two rounds find the source pixel that shows the same point: the point at the
+// pixel's depth, moved to the time when the source pixel's row was read. The result takes the source's depth,
+// transformed to the camera at the middle row, its sigma, grey value and label. Nearest pixel, no
+// interpolation; pixels that the motion uncovers have no depth.
+//
 // The two cameras read the same rectified row some 0.3 ms apart, because rectified rows are not raw rows. The
 // image moves by a tenth of a pixel in that time, and the disparity is corrected for it. Memory: 2 bytes a
 // pixel for the raw rows and 10 bytes a pixel for a second depth image, allocated by the constructor. Cost:
