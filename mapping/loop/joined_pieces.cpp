@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-/// Calls `with` for the two components of each believed loop between two.
+/// Calls `with` for each accepted loop between two components.
 template <typename With>
 void forEachTie(const RobustGraph<SE3>& graph, const With& with) {
   for (std::uint32_t id = 0; id < graph.loops(); ++id) {
@@ -59,7 +59,7 @@ void JoinedPieces::align(RobustGraph<SE3>& graph) {
   }
 }
 
-/// Of the loops between the two the best known puts `to` in its place, where none fits.
+/// Moves `to` to where the loop with most information puts it, unless a loop between the two fits already.
 void JoinedPieces::reach(RobustGraph<SE3>& graph, std::uint32_t from, std::uint32_t to) {
   double least = std::numeric_limits<double>::infinity();
   double best_known = 0;

@@ -7,9 +7,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kIterations = 100;  // of the solution of a graph that is extended, a round
+constexpr int kIterations = 100;  // per call of settle(), when a graph is extended
 
-/// What is said of another vehicle's body, as if it had been this one's at the same camera.
+/// Converts data of another vehicle's body to this vehicle's body at the same camera pose.
 struct OwnBody {
   SE3 T_theirs_ours;
 
@@ -43,7 +43,7 @@ Status LoopStage::takeIn(const KeptGraph& kept, KeptUse use) {
   std::uint32_t piece = 0;
   for (const KeptNode& from : kept.nodes) {
     LoopMap::Node node = own.node(from);
-    // A map whose poses stay is one piece, whatever held it together when it was made.
+    // A held map is one piece, even if only loops joined its parts when it was made.
     const bool first = map_.kept() == 0;
     const bool linked = !first && (held || from.linked);
     piece += !first && !from.linked ? 1 : 0;
@@ -54,9 +54,9 @@ Status LoopStage::takeIn(const KeptGraph& kept, KeptUse use) {
     if (const Status status = map_.addKept(node, linked ? &link : nullptr, held); !status.ok()) return status;
     if (from.features.empty()) continue;
     loadFeatures(from, node);
-    static_cast<void>(place_.keep(newest_, place_step_));  // a place that is refused is none
+    static_cast<void>(place_.keep(newest_, place_step_));  // if refused, the node has no place
     keepPlace();
-    // It was compared with its like in its own flight.
+    // Its own flight compared it with near nodes.
     if (place_step_.slot != PlaceDatabase::kNoSlot) comparisons_[place_step_.slot].near_left = 0;
   }
   for (const KeptLoop& loop : kept.loops) {
@@ -99,7 +99,7 @@ Status LoopStage::flyAgain(const KeptGraph& other, const LoopEffort& effort) {
   return settleWhole();
 }
 
-/// Features of a place to newest_.
+/// Loads a kept node's features into newest_.
 void LoopStage::loadFeatures(const KeptNode& from, const LoopMap::Node& node) {
   newest_.index = node.frame;
   newest_.stamp = node.stamp;
@@ -124,7 +124,7 @@ Status LoopStage::settleWhole() {
   return okStatus();
 }
 
-/// The first node of those joined to it that are the most.
+/// The first node of the joined pieces with most nodes.
 std::uint32_t LoopStage::largestPiece() const {
   std::uint32_t best = 0;
   std::size_t most = 0;

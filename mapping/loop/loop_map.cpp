@@ -9,9 +9,9 @@ namespace {
 
 using Matrix6d = PoseMatrix<SE3>;
 
-// Added to a covariance when it is inverted: no relative pose is known better.
+// Added to a covariance before it is inverted: no relative pose is known better.
 constexpr double kLeastSigma = 1e-5;  // rad, m
-constexpr double kLeastView = 0.1;    // of a node's spacing: nearer views say the same
+constexpr double kLeastView = 0.1;    // of a node's spacing: nearer views are equally redundant
 
 RobustGraphSettings graphSettings(const LoopSettings& settings) {
   RobustGraphSettings out = robustGraphSettings<SE3>();
@@ -116,7 +116,7 @@ Status LoopMap::addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_
   return status;
 }
 
-/// Of loops that all agree the one with the nearest other: it says least that is not said.
+/// The most redundant loop: its ends are nearest (in nodes) to those of another.
 std::uint32_t LoopMap::mostRepeatedLoop(const RelativePose<SE3>& added) const {
   std::uint32_t best = 0;
   std::uint32_t least = std::numeric_limits<std::uint32_t>::max();
@@ -146,7 +146,7 @@ double LoopMap::stretch(std::uint32_t k) const {
   const std::uint32_t first = before ? k - 1 : k;
   const std::uint32_t last = after ? k + 1 : k;
   const double seconds = (nodes_[last].stamp - nodes_[first].stamp).seconds();
-  // A component's first node leaves nothing behind it: as if as far again lay there.
+  // A component's end has a neighbour on one side only: its first node counts twice the distance to it.
   const double ends = before ? 1 : 2;
   return ends * (spacings(graph_.odometry().relative(first, last)) + seconds / kNodeSeconds);
 }
@@ -195,7 +195,7 @@ bool LoopMap::makeRoom(Node& left) {
   if (nodes_.size() < 3) return false;
   const OdometryChain<SE3>& chain = graph_.odometry();
   const std::uint32_t k = leastLoss();
-  if (graph_.held(k)) return false;  // all that may leave are
+  if (graph_.held(k)) return false;  // leastLoss() found no node that is not held
   const bool back = linked(k);
   const bool ahead = linked(k + 1);
   std::uint32_t onto = k;

@@ -1,5 +1,5 @@
 #pragma once
-// Counters of LoopMap, for those who report them without the map.
+// Counters of LoopMap, for code that reports them without the map.
 
 #include <cstdint>
 

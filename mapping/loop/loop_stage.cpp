@@ -13,13 +13,13 @@
 namespace swiftlet {
 namespace {
 
-// A bridge over missed keyframes: the odometry's variance grows faster than in proportion to time.
+// Factor on the covariance of a bridge over missed keyframes: the odometry's variance grows faster than time.
 constexpr double kBridgeInflation = 2;
 
-// Nearer in time two nodes are no revisit.
+// Two nodes nearer in time than this are no revisit.
 constexpr double kRevisitSeconds = 10;
 
-// Views of one place: what is farther off, or turned more, shows little of the same.
+// Two views of one place. Views farther apart or turned more have little in common.
 constexpr double kNearDistance = 2;                 // m
 constexpr double kNearTurn = std::numbers::pi / 4;  // rad
 constexpr std::size_t kNearSearches = 8;            // in a step, each linear in nodes
@@ -91,7 +91,7 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
   return status;
 }
 
-// The motion since the last node grows by the newest keyframe's.
+// Extends the motion since the last node to the newest keyframe.
 void LoopStage::extendPending(const LoopInput& input) {
   const KeyframeLink& link = *input.link;
   if (map_.size() == 0 || input.window->epoch != epoch_) pending_ = Pending{};
@@ -137,7 +137,7 @@ bool LoopStage::movedEnough(Stamp now) const {
 
 Status LoopStage::addNode(const SmoothedWindow& window) {
   const WindowPose& pose = window.poses.back();
-  // Without this a link that is not finite would spoil all that are composed with it.
+  // A link that is not finite would spoil all poses composed with it.
   pending_.linked = pending_.linked && allFinite(pending_.T_node_this) && pending_.covariance.allFinite();
   LoopMap::Node left;
   if (map_.full() && map_.makeRoom(left) && place_.database().holds(left.place, left.frame, left.epoch)) {
@@ -179,10 +179,10 @@ bool LoopStage::describePlace(const LoopInput& input) {
   return true;
 }
 
-// What rows saw at their own times, as the middle row would have: the pose is of its time.
+// Converts the features of a rolling shutter to the time of the middle row, which is that of the pose.
 void LoopStage::moveToMiddleRow(const ScanMotion& motion) {
   const CameraScan scan(rig_.T_body_cam[0], motion);
-  constexpr double kFar = 1e3;  // m: of a feature without depth the direction matters alone
+  constexpr double kFar = 1e3;  // m, for features without depth: only their direction matters
   for (PlaceFeature& feature : newest_.features) {
     const bool known = feature.inverse_depth > 0;
     const double distance = known ? 1.0 / static_cast<double>(feature.inverse_depth) : kFar;
@@ -200,7 +200,7 @@ void LoopStage::keepPlace() {
   map_.setPlace(place_step_.slot);
 }
 
-// The newest node: the nearest by the map, then those that look like it.
+// Compares the newest node with the nearest node in the map, then with similar places.
 void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
   const auto newest = static_cast<std::uint32_t>(map_.size() - 1);
   if (!hasPlace(newest) || effort.candidates == 0) return;
@@ -213,8 +213,8 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
     std::uint32_t from = 0;
     if (!map_.find(candidate.index, candidate.epoch, from) || !hasPlace(from)) continue;
     if (std::find(made.frames.begin(), made.frames.end(), candidate.index) != made.frames.end()) continue;
-    // A second loop to the same place says little more. One to another place gainsays the first: a map gone
-    // wrong must not be asked about itself alone.
+    // A second loop to the same place adds little. A loop to another place may contradict the first, so that
+    // a wrong map does not confirm itself.
     if (tied && view(from, shown) <= 1) continue;
     static_cast<void>(made.frames.tryPushBack(candidate.index));
     LoopCandidate told;
@@ -227,7 +227,7 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
   }
 }
 
-// Nodes that have no loop, the newest first.
+// Compares nodes without a loop with near nodes, the newest first.
 void LoopStage::closeNearLoops(const LoopEffort& effort, LoopReport& report) {
   std::size_t searches = 0;
   for (auto to = static_cast<std::uint32_t>(map_.size()); to-- > 0 && map_.selected() > 0;) {
@@ -241,7 +241,7 @@ void LoopStage::closeNearLoops(const LoopEffort& effort, LoopReport& report) {
   }
 }
 
-/// With the nearest node that `to` was not compared with; true where that gave a loop.
+/// Compares `to` with the nearest node that it was not compared with. True if that gave a loop.
 bool LoopStage::compareNearest(std::uint32_t to, const LoopEffort& effort, LoopReport& report) {
   Comparisons& made = comparisons_[map_.node(to).place];
   if (map_.selected() == 0 || made.near_left == 0) return false;
@@ -265,7 +265,7 @@ bool LoopStage::hasPlace(std::uint32_t k) const {
   return place_.database().holds(node.place, node.frame, node.epoch);
 }
 
-/// How far apart the map has two views, in units of what near is.
+/// Distance of two views in the map; up to 1 they are near. Infinite if nothing joins their nodes.
 double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
   if (!map_.joined(a, b)) return std::numeric_limits<double>::infinity();
   const double distance = (map_.pose(a).translation - map_.pose(b).translation).norm() / kNearDistance;
@@ -273,7 +273,7 @@ double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
   return std::max(distance, map_.pose(a).rotation.angularDistance(map_.pose(b).rotation) / kNearTurn);
 }
 
-/// Of the nodes near `to` that it was not compared with the nearest.
+/// Finds the nearest of the nodes near `to` that it was not compared with. False if there is none.
 bool LoopStage::nearestNode(std::uint32_t to, std::uint32_t& from) const {
   const auto& compared = comparisons_[map_.node(to).place].frames;
   const LoopMap::Node& now = map_.node(to);
@@ -292,7 +292,7 @@ bool LoopStage::nearestNode(std::uint32_t to, std::uint32_t& from) const {
   return found;
 }
 
-/// Geometry's answer to a candidate; true where it became a loop of the map.
+/// Verifies a candidate by geometry and offers it to the map. True if it became a loop.
 bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told, const LoopEffort& effort,
                        LoopReport& report) {
   const LoopMap::Node& old_node = map_.node(from);
@@ -352,7 +352,7 @@ void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTied
     for (std::uint32_t i = 0; i < map_.loops(); ++i) {
       if (!map_.selected(i)) continue;
       const RelativePose<SE3>& edge = map_.loopEdge(i);
-      // What a kept map was made of is one.
+      // All pieces of a kept map count as one epoch.
       const std::uint32_t a = std::min(map_.node(edge.from).epoch, kKeptEpochs);
       const std::uint32_t b = std::min(map_.node(edge.to).epoch, kKeptEpochs);
       if (isTied(a) != isTied(b)) static_cast<void>(out.tryPushBack(isTied(a) ? b : a));
