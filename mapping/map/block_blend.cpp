@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-/// A block turned by any angle touches so many along an axis.
+/// Largest number of blocks along an axis that a block turned by any angle touches.
 constexpr int kMostAlong = 4;
 
 Eigen::Vector3d firstOf(const BlockIndex& block) {
@@ -29,7 +29,7 @@ void forBlocks(const BlockRange& range, const Take& take) {
   }
 }
 
-/// Of a block, x fastest.
+/// Index of a block in the range, x fastest.
 std::size_t numberIn(const BlockRange& range, const BlockIndex& block) {
   const auto along = [](std::int32_t low, std::int32_t at) { return static_cast<std::size_t>(at - low); };
   const std::size_t wide = along(range.low.x, range.high.x) + 1, deep = along(range.low.y, range.high.y) + 1;
@@ -39,7 +39,7 @@ std::size_t numberIn(const BlockRange& range, const BlockIndex& block) {
 
 std::size_t blocksIn(const BlockRange& range) { return numberIn(range, range.high) + 1; }
 
-/// Those of which all voxels are in the set.
+/// The parts of which all voxels are in the set.
 std::uint64_t wholeParts(const std::bitset<kBlockVoxels>& voxels) {
   std::uint64_t parts = kAllParts;
   for (std::size_t at = 0; at < kBlockVoxels; ++at) {
@@ -48,7 +48,7 @@ std::uint64_t wholeParts(const std::bitset<kBlockVoxels>& voxels) {
   return parts;
 }
 
-/// Along one axis, from the neighbours that are known [steps a voxel].
+/// Slope of the distance along one axis, from the known neighbours [steps per voxel].
 float slopeAt(const VoxelBlock& block, std::size_t at, int along, std::size_t stride) {
   const auto distance = [&](std::size_t i) { return static_cast<float>(block.distance[i]); };
   const bool before = along > 0 && block.weight[at - stride] > 0;
@@ -69,7 +69,7 @@ void BlockBlend::place(const StoredBlock& block, const SE3& motion) {
   const double voxel = volume_.settings().voxel_size;
   const SE3 back = motion.inverse();
   to_block_ = back.R();
-  // Centres lie half a voxel from the corner that a number names.
+  // A voxel's centre is half a voxel from the corner at its index.
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.5);
   at_block_ = to_block_ * half + back.translation / voxel - half - firstOf(block.index);
   const Eigen::Vector3d centre =
@@ -81,7 +81,7 @@ void BlockBlend::place(const StoredBlock& block, const SE3& motion) {
     return BlockIndex{static_cast<std::int32_t>(b.x()), static_cast<std::int32_t>(b.y()),
                       static_cast<std::int32_t>(b.z())};
   };
-  // Half a voxel less: a centre has to fall in.
+  // Half a voxel less, because only voxel centres count.
   box_ = {block_at(centre - extent + half), block_at(centre + extent - half)};
 }
 
@@ -173,7 +173,7 @@ void BlockBlend::endFree() {
   });
 }
 
-/// As by one image (VoxelVolume::obtain).
+/// Unknown voxels of the parts become free as by one image (VoxelVolume::obtain).
 void BlockBlend::fillFree(std::uint32_t slot, std::uint64_t parts) {
   VoxelBlock& to = volume_.changeVoxels(slot);
   for (std::size_t at = 0; at < kBlockVoxels; ++at) {

@@ -9,7 +9,7 @@ KeptSubmaps::KeptSubmaps(MapSubmaps& to, std::span<const WorldInMap> nodes) : to
   anchors_.reserve(nodes.size() / each + 1);
   for (std::size_t i = 0; i < nodes.size(); i += each) {
     const WorldInMap& node = nodes[i];
-    // With the rounding of a node that stays where it was.
+    // Identity with the rounding of WorldInMap::T_map_world(), so that a node that stays has not moved.
     const SE3 T_map_world = node.T_world_body * node.T_world_body.inverse();
     if (!to.addKept({{}, node.frame, node.epoch, node.T_world_body, T_map_world, T_map_world})) break;
     anchors_.push_back({node.T_world_body.translation.cast<float>(), to.submaps().newest()});

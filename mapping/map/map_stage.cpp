@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-// Two voxels of surface on each side are known without the noise of one image deciding where it ends.
+// Two voxels on each side of a surface are known, whatever the noise of a single image.
 constexpr double kTruncationVoxels = 3;
 constexpr double kBehindVoxels = 2;
 /// VolumeSettings::most_sigma in truncation distances.

@@ -6,15 +6,15 @@
 namespace swiftlet {
 namespace {
 
-/// Of a voxel: what images of one block may disagree by, and a block be out of place.
+/// How far images fused into one block may disagree, and how far a block may be out of place [voxels].
 constexpr double kMixedVoxels = 0.1;
 constexpr double kOutOfPlaceVoxels = 0.5;
-/// Blocks come back each time that the vehicle has gone so far [m].
+/// A new pass over the stored blocks begins after the vehicle has moved this far [m].
 constexpr double kPassStep = 1;
 /// Records looked at in one step: 1 ms.
 constexpr std::size_t kMostRecords = std::size_t{1} << 16U;
-/// A block reaches so many blocks from the one that its centre is in, turned by any angle; the surface of a
-/// tile takes one more on each side.
+/// A block turned by any angle reaches at most kBlockReach blocks beyond the one with its centre. The surface
+/// of a tile needs kTileMargin more blocks on each side.
 constexpr int kBlockReach = 1, kTileMargin = 1;
 
 struct InTile {
@@ -109,7 +109,8 @@ void MapSubmaps::correct(std::span<const WorldInMap> worlds) {
   layHintsAnew();
 }
 
-/// They do not tell which submaps they are of, and have left with the blocks that they were laid into.
+/// Removes all hints, for step() to return them: hints do not know their submap, and those in blocks that
+/// left the volume are lost.
 void MapSubmaps::layHintsAnew() {
   leaving_.clear();
   for (std::uint32_t slot = 0; slot < volume_.slots(); ++slot) {
@@ -120,7 +121,7 @@ void MapSubmaps::layHintsAnew() {
   cursor_ = 0;
 }
 
-/// Whether two submaps lie to each other at a block as when they were fused.
+/// Whether two submaps have not moved relative to each other at a block since they were fused.
 bool MapSubmaps::agree(SubmapId a, SubmapId b, const BlockIndex& block) const {
   if (submaps_[a].epoch != submaps_[b].epoch) return false;
   if (!submaps_[a].hasMoved() && !submaps_[b].hasMoved()) return true;
@@ -156,7 +157,7 @@ void MapSubmaps::beforeRemoval(const VoxelVolume& volume, std::span<const std::u
 void MapSubmaps::beforeRenewal(const VoxelVolume& volume, std::uint32_t slot) {
   const std::size_t before = stored_.size();
   stored_.put(volume, slot);
-  // It stays where it is, as a hint.
+  // The block stays in the volume as a hint.
   if (stored_.size() > before) stored_.setShown(before, true);
 }
 
@@ -219,7 +220,7 @@ void MapSubmaps::visitWhole(
     for (auto p = part; p != end; ++p) {
       if (read(*p)) blend.add(scratch_, submaps_[p->submap].motion(), outer);
     }
-    // What is known to be free bounds surface as voxels do.
+    // Free space without voxels bounds surfaces as voxels do.
     blend.beginFree(outer);
     for (; part != end; ++part) {
       const bool is_free =

@@ -6,18 +6,19 @@
 namespace swiftlet {
 namespace {
 
-/// A place may be known as free and, in another submap, by voxels. The top bit of a block's key is always
-/// set.
+/// Separate keys for free blocks and those with voxels, because an index may have both in different submaps.
+/// The top bit of keyOf() is always set.
 std::uint64_t placeKey(const BlockIndex& index, bool is_free) {
   return keyOf(index) ^ (is_free ? std::uint64_t{1} << 63U : 0);
 }
 
-/// Of the truncation distance: as good as all of it.
+/// A voxel is free up to the truncation distance if its distance is at least this share of it.
 constexpr float kFreeShare = 0.98F;
-/// Of the earlier weight: what says otherwise later counts with this and more. A mismatch has less.
+/// A later voxel that contradicts replaces the earlier if it has at least this share of its weight.
+/// Mismatches have less.
 constexpr float kLaterCounts = 0.25F;
 
-/// Behind a surface, and free up to the truncation distance.
+/// Whether one is behind a surface and the other free up to the truncation distance.
 bool contradict(float a, float b) {
   return (a < 0 && b >= kFreeShare * kDistanceSteps) || (b < 0 && a >= kFreeShare * kDistanceSteps);
 }
@@ -43,7 +44,7 @@ bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most
   const float sum = own + other;
   to.distance[to_at] = distanceOf((own * static_cast<float>(to.distance[to_at]) + other * distance) / sum);
   to.weight[to_at] = static_cast<std::uint16_t>(std::min(sum, most_weight * kWeightSteps));
-  // What is free has no grey value.
+  // Free voxels have no grey value.
   const std::uint8_t grey = from.grey[at];
   if (grey > 0 && to.grey[to_at] > 0) {
     to.grey[to_at] = static_cast<std::uint8_t>(std::lround((own * to.grey[to_at] + other * grey) / sum));
@@ -61,7 +62,7 @@ StoredBlocks::StoredBlocks(const VolumeSettings& settings, BlockStorage* storage
   if (storage != nullptr) records_.reserve(kMost);
 }
 
-/// Of the place's newest record of this kind, where it may take more; else null.
+/// The newest record of this index and kind, if its submap agrees with `submap`; otherwise null.
 StoredBlocks::Record* StoredBlocks::agreeing(const BlockIndex& index, SubmapId submap, bool is_free) {
   const std::uint32_t at = newest_.find(placeKey(index, is_free));
   if (at == BlockHash::kNone || !agree_(records_[at].submap, submap, index)) return nullptr;
@@ -72,7 +73,7 @@ StoredBlocks::Record* StoredBlocks::add(const Record& record) {
   if (records_.size() == records_.capacity()) return nullptr;
   const std::uint64_t key = placeKey(record.index, record.is_free);
   static_cast<void>(newest_.erase(key));
-  // Where the table has no place nearby, the next block of the place is a record of its own.
+  // If the table refuses the key, the next block of this index gets a record of its own.
   static_cast<void>(newest_.insert(key, static_cast<std::uint32_t>(records_.size())));
   records_.push_back(record);
   return &records_.back();
@@ -122,7 +123,7 @@ void StoredBlocks::put(const StoredBlock& block) {
   records_.pop_back();
 }
 
-/// Into what merged_ holds, the content of `record`.
+/// Merges a block into merged_, which holds the content of `record`, and writes the result.
 bool StoredBlocks::merge(Record& record, const StoredBlock& block) {
   if (!merged_.has_labels) merged_.labels.counts.fill({});
   merged_.has_labels = merged_.has_labels || block.has_labels;
@@ -135,10 +136,10 @@ bool StoredBlocks::merge(Record& record, const StoredBlock& block) {
     if (block.has_labels) merged_.labels.counts[at].add(block.labels.counts[at]);
   }
   Record next = record;
-  // What it is now was seen last by the later.
+  // The merged block was last seen in the later submap.
   next.submap = block.submap;
   if (next.has_labels != merged_.has_labels) {
-    // It has become longer.
+    // With labels it no longer fits at its offset.
     next.has_labels = merged_.has_labels;
     next.offset = end_;
   }

@@ -7,14 +7,15 @@
 namespace swiftlet {
 namespace {
 
-/// Loops spread what they correct over the flight since: of 30 cm over a minute 1 cm within this.
+/// Loops spread a correction over the flight since: 30 cm over a minute is 1 cm within this time.
 constexpr double kSubmapSeconds = 2;
-/// What was not seen for as long is seen with the drift of the way between. A turn of the head is shorter.
+/// A block not seen for this long is seen again with the drift of the flight between. Looking away briefly
+/// takes less time.
 constexpr double kStaleSeconds = 10;
-/// By how far a turn moves what was seen [m/rad].
+/// Displacement of the observed surface by a rotation [m/rad].
 constexpr double kSubmapArm = 3;
 
-/// What a body's images show lies so far apart with the one and the other.
+/// How far apart the two transforms put what a body's images show [m].
 double shiftOf(const SE3& T_map_world_a, const SE3& T_map_world_b, const SE3& T_world_body) {
   const SE3 a = T_map_world_a * T_world_body, b = T_map_world_b * T_world_body;
   return (a.translation - b.translation).norm() + kSubmapArm * a.rotation.angularDistance(b.rotation);
@@ -22,7 +23,7 @@ double shiftOf(const SE3& T_map_world_a, const SE3& T_map_world_b, const SE3& T_
 
 static_assert(Submaps::kMost <= std::size_t{std::numeric_limits<SubmapId>::max()} + 1);
 
-/// Where the world of a frame of `epoch` lies, from the keyframes before and after it; false: none is of that
+/// T_map_world at the submap's anchor, from the keyframes before and after it. False if neither is of its
 /// epoch.
 bool worldOf(const Submap& submap, std::span<const WorldInMap> worlds, SE3& T_map_world) {
   const auto after = std::ranges::lower_bound(worlds, submap.frame, {}, &WorldInMap::frame);
@@ -30,7 +31,7 @@ bool worldOf(const Submap& submap, std::span<const WorldInMap> worlds, SE3& T_ma
   const bool has_before = after != worlds.begin() && std::prev(after)->epoch == submap.epoch;
   if (!has_after && !has_before) return false;
   if (has_after && after->frame == submap.frame) {
-    // It was fused from where the odometry had it first; the smoother has moved it within its world since.
+    // Images were fused with the odometry's first estimate; the smoother has moved the keyframe since.
     T_map_world = after->T_map_body * submap.T_world_body.inverse();
     return true;
   }
@@ -39,8 +40,8 @@ bool worldOf(const Submap& submap, std::span<const WorldInMap> worlds, SE3& T_ma
   const WorldInMap& before = *std::prev(after);
   const double part =
       static_cast<double>(submap.frame - before.frame) / static_cast<double>(after->frame - before.frame);
-  // The map moves the bodies, not the far origin of the world: a body's place is interpolated, lest a turn
-  // about that origin be taken for a shift.
+  // Interpolate the body's pose, not that of the world: its origin is far away, and a rotation about it would
+  // appear as a shift.
   const SE3 a = before.T_map_world() * submap.T_world_body, b = after->T_map_world() * submap.T_world_body;
   SE3 body;
   body.rotation = a.rotation.slerp(part, b.rotation);
@@ -96,7 +97,7 @@ bool Submaps::follow(const Submap& image) {
 
 Submaps::Correction Submaps::correct(std::span<const WorldInMap> worlds) {
   Correction correction;
-  // They may still be those of an epoch that is over.
+  // `worlds` may still be those of an earlier epoch.
   const bool of_newest =
       std::ranges::any_of(worlds, [&](const WorldInMap& world) { return world.epoch == epoch_; });
   for (std::size_t i = 0; i < submaps_.size(); ++i) {
@@ -109,7 +110,7 @@ Submaps::Correction Submaps::correct(std::span<const WorldInMap> worlds) {
     if (!listed) continue;
     correction.moved = correction.moved || shift(submap, T_map_world) > 0;
     submap.T_map_world = T_map_world;
-    // The last that there can be takes all images to come.
+    // The last of kMost submaps takes all further images, so it never becomes outdated.
     outdated_[i] = i + 1 < kMost && shift(submap, submap.T_map_world_fused) > tolerance_ ? 1 : 0;
   }
   return correction;

@@ -5,7 +5,7 @@
 namespace swiftlet {
 namespace {
 
-// Nearer than this the centres are one: at half a metre the shift is below a pixel [m].
+// Centres nearer than this count as one [m]: at half a metre the shift is below a pixel.
 constexpr double kOneCentre = 0.001;
 
 Eigen::Vector3d rayOf(const PinholeIntrinsics& camera, int x, int y) {
