@@ -11,8 +11,8 @@ namespace {
 /// Depth [m] below which nothing is projected.
 constexpr float kNearestDepth = 0.05F;
 constexpr float kMostWeightSteps = 65535.0F;
-/// A measurement says that something came if it is nearer than what is known by this share of the truncation
-/// distance (errors of poses and depths are smaller) and by so many of its sigmas.
+/// A measurement shows that something has come if it is nearer than the known surface by this share of the
+/// truncation distance (errors of poses and depths are smaller) and by this many of its sigmas.
 constexpr float kNearer = 0.5F;
 constexpr double kSureSigmas = 3;
 
@@ -80,7 +80,7 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   const Ints inside = (z > kNearestDepth) & (u >= 0.0F) & (u < static_cast<float>(c.width)) & (v >= 0.0F) &
                       (v < static_cast<float>(c.height));
   if (!lanes::any(inside)) return;
-  // Where outside the conversion would overflow.
+  // Outside the image the conversion could overflow.
   const Ints column = __builtin_convertvector(inside ? u : Floats{}, Ints);
   const Ints row = __builtin_convertvector(inside ? v : Floats{}, Ints);
   const Ints pixel = inside ? row * c.width + column : Ints{} + static_cast<std::int32_t>(c.pixels());
@@ -142,7 +142,7 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   sums.largest = change > sums.largest ? change : sums.largest;
   sums.observed -= seen;
   const Ints near = hit & (s < truncation);
-  // A first observation far in front makes no surface, but free space of the unknown.
+  // A first observation far in front of a surface adds no surface, but turns unknown space into free space.
   sums.news |= seen & ((old_weight == 0.0F) | (now_behind ^ (old_distance < 0.0F)));
   if (lanes::any(near)) colour(pixel, near, gain, sum, at, block, labels, sums);
 }

@@ -84,7 +84,7 @@ LabelEstimate ConfusionModel::estimate(const LabelCounts& counts) const {
   const auto count = static_cast<std::size_t>(labels_);
   std::size_t best = 1;
   for (std::size_t i = 2; i < count; ++i) best = sum[i] > sum[best] ? i : best;
-  // Of what is more than a millionth as likely.
+  // Only labels that are more than a millionth as likely as the best count.
   constexpr float kLeastLog = -14;
   float total = 0;
   for (std::size_t i = 1; i < count; ++i) {

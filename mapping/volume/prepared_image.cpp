@@ -69,7 +69,7 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
   std::uint32_t measured = 0, beyond = 0;
   for (std::size_t i = 0; i < pixels; ++i) {
     const float d = image.depth[i];
-    // False for NaN; an infinite depth says nothing of what is on the way.
+    // False for NaN. An infinite depth is not usable: it does not prove that the ray is free.
     const bool usable = d >= least && d < kFarAway;
     depth_[i] = usable ? d : 0.0F;
     measured += usable ? 1U : 0U;
@@ -104,7 +104,7 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
         image.sigma != nullptr ? image.sigma[i] : constant + quadratic * depth_[i] * depth_[i];
     const bool known = sigma > 0 && sigma < kFarAway;
     weight_[i] = weightOf(known ? sigma : 1.0F);
-    // A deviation that is no number leaves the pixel without a measurement.
+    // A pixel without a valid deviation counts as unmeasured.
     if (!known) depth_[i] = 0;
     const bool far = depth_[i] > most;
     if (!known || (sigma <= most_sigma && !far) || depth_[i] <= 0) continue;
@@ -147,7 +147,7 @@ void PreparedImage::findSlopes() {
     const float y = (static_cast<float>(v) - cy) / fy;
     for (std::size_t u = 1; u + 1 < width; ++u) {
       const float here = row[u];
-      // Where a neighbour was not measured the other one decides, or none.
+      // If one neighbour was not measured, the other is used; without both the result is 0.
       const auto nearer = [here](float before, float after) {
         const float down = before > 0 ? here - before : kNoSlope, up = after > 0 ? after - here : kNoSlope;
         const float least = std::abs(down) < std::abs(up) ? down : up;

@@ -7,15 +7,15 @@
 namespace swiftlet {
 namespace {
 
-/// Every so many pixels a surface point lists its blocks: 9 cm at 10 m with a focal length of 430 px.
+/// Pixels between points that list their blocks: 9 cm at 10 m with a focal length of 430 px.
 constexpr int kBandStride = 4;
 /// Tiles of PreparedImage along the edge of a bundle.
 constexpr int kBundleTiles = 2;
-/// How much farther than its depth a ray may be long: a corner of a view of 110 degrees.
+/// Largest ratio of a ray's length to its depth: at the corner of a view of 110 degrees.
 constexpr double kRayStretch = 1.75;
 /// A cube nearer than this [m] is not judged as a whole.
 constexpr float kNearestBlock = 0.05F;
-/// Two images of one pose may differ by this much at once: the noise of an estimate.
+/// Noise of estimated poses, which is no pose jump however close in time two images are.
 constexpr double kPoseSlack = 0.05;  // m
 constexpr double kTurnSlack = 0.05;  // rad
 
@@ -44,8 +44,8 @@ int reachOf(const VolumeSettings& s) {
   return static_cast<int>(std::ceil(kRayStretch * s.most_range / (s.voxel_size * kBlockSide))) + 2;
 }
 
-/// Blocks that one image can list: as many as the points that it looks at may touch, and not more than the
-/// volume has use for.
+/// Largest number of blocks that an image lists: as many as its points can touch, but not more than the
+/// volume can use.
 std::size_t bandCapacity(const VoxelVolume& volume, std::size_t most_pixels) {
   return std::min(8 * (most_pixels / (kBandStride * kBandStride) + 1), 4 * volume.blockCapacity() + 64);
 }
@@ -294,7 +294,7 @@ void VolumeIntegrator::meetOnRay(const BlockIndex& block, VolumeStep& out) {
   const float behind = freeBehind(centre, 1);
   const auto truncation = static_cast<float>(volume_.settings().truncation);
   if (state == BlockState::kVoxels) {
-    // In front of a surface seen at a glancing angle, much depth is little distance.
+    // In front of a surface seen at a glancing angle, a large depth is a small distance.
     update(slot, behind >= truncation / PreparedImage::kLeastSlope, out);
   } else if (const std::uint64_t parts = behind >= truncation ? kAllParts : freeParts(centre, known);
              parts != 0) {

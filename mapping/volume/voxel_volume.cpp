@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-/// Of the pool, dropped at once when it is full, so that not every image has to choose.
+/// A full pool drops 1 / kEvictionShare of its blocks at once, so that not every image has to choose.
 constexpr std::size_t kEvictionShare = 32;
 
 }  // namespace
@@ -112,7 +112,7 @@ std::size_t VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::span<Bloc
     if (headers_[slot].state == BlockState::kVoxels)
       far_[count++] = farness(headers_[slot].index, slot, vehicle);
   }
-  // New ones that the scratch does not hold are judged by the same limit, and refused by obtain() at worst.
+  // New blocks for which the scratch has no room have the same limit; at worst obtain() refuses them.
   for (const BlockIndex& block : wanted) {
     if (isNew(block) && count < far_.size()) far_[count++] = farness(block, kNone, vehicle);
   }
@@ -131,7 +131,7 @@ std::size_t VoxelVolume::makeRoom(const Eigen::Vector3f& vehicle, std::span<Bloc
       std::ranges::count_if(wanted, [&](const BlockIndex& block) { return isNew(block) && tooFar(block); }));
   counters_.evicted += leaving;
   remove({leaving_.data(), leaving});
-  // Among these are blocks that were there and have just left.
+  // Some wanted blocks were in the volume and have just been removed.
   std::size_t kept = 0;
   for (BlockIndex& block : wanted) {
     if (!isNew(block) || !tooFar(block)) std::swap(wanted[kept++], block);
@@ -181,7 +181,8 @@ std::uint32_t VoxelVolume::obtain(const BlockIndex& block) {
   unused_data_.pop_back();
   VoxelBlock& voxels = blocks_[header.data];
   voxels.distance.fill(static_cast<std::int16_t>(kDistanceSteps));
-  // Free by the depth in front of what was measured, which is more than the distance: one observation.
+  // Free space is known by depth in front of a surface, which exceeds the distance: it counts as one
+  // observation.
   for (std::size_t at = 0; at < kBlockVoxels; ++at)
     voxels.weight[at] = (free_parts & partBitAt(at)) != 0 ? weight : 0;
   voxels.grey.fill(0);
@@ -204,7 +205,7 @@ void VoxelVolume::addFree(const BlockIndex& block, std::uint64_t parts, const Ei
   if (slot == kNone) return;
   BlockHeader& header = headers_[slot];
   if (std::exchange(header.hinted, false)) header.submap = submap_;
-  // What was free long ago is not in doubt for that alone.
+  // Free space is not in doubt only because it was seen long ago.
   if (outdated_ != nullptr && outdated_[header.submap] != 0) {
     for (std::size_t i = 0; i < listener_count_; ++i) listeners_[i]->beforeRenewal(*this, slot);
     header.free_parts = 0;
@@ -292,7 +293,7 @@ void VoxelVolume::remove(std::span<const std::uint32_t> slots) {
 }
 
 void VoxelVolume::discard(std::span<const std::uint32_t> slots) {
-  // A slot that a reader has just looked at may change hands within this set of changes.
+  // A new revision: a slot that a reader has just read may be reused within this set of changes.
   ++revision_;
   for (const std::uint32_t slot : slots) drop(slot);
 }
