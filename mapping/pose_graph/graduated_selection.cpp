@@ -19,7 +19,8 @@ double graduatedWeight(double chi_squared, double limit, double mu) {
   return std::sqrt(limit * mu * (mu + 1) / chi_squared) - mu;
 }
 
-/// Weight of loops that reach 0 while mu grows. They may return, unlike those left out at the start.
+/// Weight of loops that reach 0 while mu grows. They may return before it ends, unlike those left out at the
+/// start.
 constexpr double kAlmostOut = 1e-12;
 
 bool decided(std::span<const double> weights) {

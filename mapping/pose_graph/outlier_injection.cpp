@@ -12,7 +12,7 @@
 namespace swiftlet {
 namespace {
 
-/// Least number of poses between a false loop's ends; neighbours would be joined by an odometry edge.
+/// Least difference of the numbers of a false loop's poses; an edge between neighbours would be odometry.
 constexpr std::uint32_t kMinGap = 2;
 
 SE2 randomPose(const Eigen::Vector2d& low, const Eigen::Vector2d& high, Random& random) {

@@ -4,16 +4,21 @@
 // Gauss-Newton in a trust region (Powell's dogleg in the norm of the normal equations' diagonal) with exact
 // Jacobians. The normal equations are blocks of poses, factored by BlockCholesky. A rejected step costs an
 // evaluation of the cost, not a factorization. start() computes initial poses if the present ones are poor.
+//
 // In a flight one optimizer is kept: add poses and edges and call optimize() with the effort that time
 // allows. It continues from the present poses and keeps ordering and memory until a new pair of poses is
-// joined. Frames: T_map_body. Held poses do not move: those given to hold(), and the first pose of every
-// piece of the graph without one (only in heading and position if a pose of the piece knows the vertical).
-// Weights multiply an edge's information: 0 leaves an edge out, between 0 and 1 discounts it (graduated
-// non-convexity). Errors: Status. Memory: poses and edges are reserved at construction, and the factor if
-// max_factor_values is set; a graph whose factor needs more is then refused. Ordering and analysis of a
-// changed graph take scratch memory. Deterministic; no clock. Off the flight path. Sources: Rosen, Kaess,
-// Leonard, "RISE: an incremental trust-region method", T-RO 2014 (dogleg on pose graphs); Nocedal and Wright,
-// "Numerical Optimization", 2006, chapter 4; docs/pose_graph.md.
+// joined.
+//
+// Frames: T_map_body. Held poses do not move: those given to hold(), and the first pose of every piece of the
+// graph without one (only in heading and position if a pose of the piece knows the vertical). Weights
+// multiply an edge's information: 0 leaves an edge out, between 0 and 1 discounts it (graduated
+// non-convexity).
+//
+// Errors: Status. Memory: poses and edges are reserved at construction, and the factor if max_factor_values
+// is set; a graph whose factor needs more is then refused. Ordering and analysis of a changed graph take
+// scratch memory. Deterministic; no clock. Off the flight path. Sources: Rosen, Kaess, Leonard, "RISE: an
+// incremental trust-region method", T-RO 2014 (dogleg on pose graphs); Nocedal and Wright, "Numerical
+// Optimization", 2006, chapter 4; docs/pose_graph.md.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -84,7 +89,8 @@ class PoseGraphOptimizer {
 
   /// Takes the poses of ChordalStart if they cost less than the present ones (docs/pose_graph.md section 3),
   /// or, with `anew`, even if they cost more. Keeps the present ones if these fit, if ChordalStart fails, or
-  /// if a piece of the graph has no held pose. kNotReady and kCapacityReached as for optimize().
+  /// if a piece of the graph is anchored instead of held (GraphLayout). kNotReady and kCapacityReached as for
+  /// optimize().
   Status start(StartReport& report, bool anew = false);
 
   /// kNotReady without poses; kNumerical if the normal equations cannot be factored even with damping;
