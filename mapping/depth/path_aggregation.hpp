@@ -35,7 +35,7 @@ struct MatchingRow {
   const std::uint8_t* grey = nullptr;         ///< left image; one more pixel at both ends
   const std::uint8_t* grey_before = nullptr;  ///< row of q, for a path across rows
   std::array<const std::uint8_t*, kCensusPlanes> left_signs{};
-  std::array<const std::uint8_t*, kCensusPlanes> right_signs{};  ///< mirrored; 32 kVectors bytes more
+  std::array<const std::uint8_t*, kCensusPlanes> right_signs{};  ///< mirrored; 32 kVectors bytes longer
 };
 
 /// Results per pixel of the row. The smallest of equal disparities wins.

@@ -15,7 +15,8 @@ constexpr int kMinCell = 12;                        // px: a cell's least side
 // Average number of features per cell. With fewer, weak corners are taken to cover every cell; with more, the
 // image is covered unevenly.
 constexpr int kWantedPerCell = 3;
-// Tracked features are described in one of this many octaves (up to scale 1.7), the size of their patches.
+// Tracked features are described in one of this many octaves (up to scale 1.7), because their patches are of
+// this size.
 constexpr int kTrackedOctaves = 4;
 // A corner this near to a described feature of the same octave is the same corner.
 constexpr float kSameCorner = 3.0F;  // px of the octave
