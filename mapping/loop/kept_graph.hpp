@@ -5,7 +5,7 @@
 //
 // Poses are those of the body that flew, in the map's frame (z up). T_body_cam is the pose of its camera 0. A
 // vehicle with the camera elsewhere converts the poses to those of its own body at the same camera pose.
-// Memory: 100 bytes a feature, some 30 kB a node.
+// Memory: 72 bytes a feature, some 30 kB a node.
 
 #include <cstdint>
 #include <vector>

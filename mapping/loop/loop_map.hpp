@@ -81,7 +81,8 @@ class LoopMap {
   /// Index of a keyframe's node; false if the node was removed.
   [[nodiscard]] bool find(std::uint64_t frame, std::uint32_t epoch, std::uint32_t& k) const;
 
-  /// Removes the node of least loss and returns it in `left`. False with fewer than three nodes.
+  /// Removes the node of least loss and returns it in `left`. False with fewer than three nodes, or if all
+  /// but the newest are held.
   bool makeRoom(Node& left);
   /// Adds a node, joined to the last by `link`. Null: the first of a component, at its T_world_body.
   /// kCapacityReached: full, see makeRoom(). kInvalidInput: not finite.

@@ -5,7 +5,7 @@
 // moves with the node nearest to it: space is deformed by rigid pieces, and the surface follows the graph.
 // Neighbouring nodes move alike, because only new loops can still move them.
 //
-// Frames: map, that of the kept graph. Memory: 32 bytes a node. Cost of a block: linear in nodes; at most
+// Frames: map, that of the kept graph. Memory: 16 bytes a node. Cost of a block: linear in nodes; at most
 // kMost of them are used, evenly chosen. Source of the idea: Whelan et al., Kintinuous and ElasticFusion,
 // whose deformation graphs follow the camera's path.
 

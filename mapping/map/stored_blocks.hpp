@@ -3,9 +3,10 @@
 //
 // A record in memory tells where a block of a submap is in the storage. A block has several records if
 // submaps far apart in time saw it; readers overlay them (block_blend.hpp). A free block without voxels is
-// only a record. Memory: 24 bytes a block and two blocks of scratch, reserved at construction. Cost: a copy
-// of 2.5 kB, 6.6 kB with labels, to or from the storage. Errors: a block that the storage refuses, or for
-// which no record is left, is lost and counted; so are reads that fail. Not thread safe.
+// only a record. Memory: 56 bytes a record, of which 32 for the index, and two blocks of scratch, reserved at
+// construction. Cost: a copy of 2.5 kB, 6.6 kB with labels, to or from the storage. Errors: a block that the
+// storage refuses, or for which no record is left, is lost and counted; reads that fail are counted. Not
+// thread safe.
 
 #include <cstddef>
 #include <cstdint>

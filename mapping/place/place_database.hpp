@@ -79,11 +79,11 @@ class PlaceDatabase {
   PlaceDatabase(std::size_t words, const PlaceDatabaseSettings& settings = {});
 
   /// Candidates of a keyframe; call it before add(). Keyframes must come in order of time, because islands
-  /// are remembered for the next query. kNotReady if no stored keyframe is old enough, kInvalidInput for a
-  /// word beyond the vocabulary.
+  /// are remembered for the next query. kNotReady if no stored keyframe is old enough, kInvalidInput for an
+  /// invalid bag: words beyond the vocabulary or not rising, values not above 0.
   [[nodiscard]] Status query(Stamp stamp, std::uint32_t epoch, const BagOfWords& bag, PlaceQuery& result);
   /// Stores the keyframe. kCapacityReached if others were removed for it; it then reuses a slot of theirs.
-  /// kInvalidInput for a word beyond the vocabulary, or a keyframe that cannot fit.
+  /// kInvalidInput for an invalid bag, or a keyframe that cannot fit.
   [[nodiscard]] Status add(std::uint64_t index, Stamp stamp, std::uint32_t epoch, const BagOfWords& bag,
                            std::uint32_t& slot);
 

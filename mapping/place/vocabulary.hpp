@@ -44,7 +44,8 @@ class Vocabulary {
   /// finite.
   [[nodiscard]] Status assemble(std::span<const VocabularyNode> nodes);
 
-  /// Sets the weights, one for each word. kInvalidInput, without effect, if one is negative or not finite.
+  /// Sets the weights, one for each word. kInvalidInput, without effect, if their number differs from that of
+  /// the words, or one is negative or not finite.
   [[nodiscard]] Status weigh(std::span<const float> weights);
 
   [[nodiscard]] std::size_t words() const { return words_; }

@@ -11,7 +11,7 @@
 // (tested).
 //
 // An epoch of the odometry is a component; there is no chain between components.
-// Memory: pose, sum, box and component, 408 (space) or 136 (plane) bytes a pose, reserved by the constructor.
+// Memory: pose, sum, box and component, 416 (space) or 144 (plane) bytes a pose, reserved by the constructor.
 
 #include <Eigen/StdVector>
 #include <cstdint>
