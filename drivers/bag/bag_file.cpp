@@ -60,7 +60,7 @@ void BagFile::checkStamp(std::uint32_t topic, Stamp stamp) const {
 
 bool isBag(const std::string& path) {
   if (std::filesystem::is_directory(path)) return isRosbag2Folder(path);
-  constexpr std::size_t kBegin = 16;  // bytes that tell every kind
+  constexpr std::size_t kBegin = 16;  // bytes; enough to tell all kinds apart
   BagKind kind = bagKindOf(path);
   if (kind == BagKind::kZstd) kind = bagKindOf(std::string_view(unpackedBegin(path, kBegin)));
   return kind != BagKind::kNone && kind != BagKind::kZstd;
@@ -70,7 +70,7 @@ std::unique_ptr<BagFile> openBag(const std::string& path) {
   if (std::filesystem::is_directory(path)) return openRosbag2Folder(path);
   BagKind kind = bagKindOf(path);
   std::string file = path;
-  // Unlinked once it is open: nothing is left whatever happens.
+  // Unlinked once it is open, so no temporary file is left behind.
   std::unique_ptr<UnpackedFile> unpacked;
   if (kind == BagKind::kZstd) {
     unpacked = std::make_unique<UnpackedFile>(path);

@@ -3,10 +3,10 @@
 // 1 bags if the build has rosbag-storage. Messages stay bytes here; drivers/bag/ros_messages.hpp decodes
 // them.
 //
-// Order: the time at which the recorder received a message; messages with equal times in the file's order.
-// Errors: InputError with file, byte or row, and the remedy. Every read is bounds-checked and existing
-// checksums are compared: a damaged file is rejected when it is opened or when the damaged message is read. A
-// file that its recorder did not close gives its intact part, and a warning names the byte where it ends.
+// Order: by the time at which the recorder received a message; equal times in the file's order. Errors:
+// InputError with file, byte or row, and the remedy. Every read is bounds-checked and checksums are verified
+// if present: a damaged file is rejected when it is opened or when the damaged message is read. If the
+// recorder did not close the file, its intact part is read and a warning names the byte where it ends.
 // Memory: 24 bytes per message, and four decompressed chunks of an MCAP file. Threads: one per file. Host
 // side only.
 
@@ -23,23 +23,23 @@ namespace swiftlet {
 
 enum class BagEncoding : std::uint8_t {
   kRos1,   ///< packed, little-endian
-  kCdr,    ///< ROS 2: four bytes of header, then aligned CDR
-  kOther,  ///< not read: JSON, Protobuf, ...
+  kCdr,    ///< ROS 2: a header of four bytes, then aligned CDR
+  kOther,  ///< not decoded: JSON, Protobuf, ...
 };
 
 struct BagTopic {
   std::string name;
-  std::string type;  ///< `sensor_msgs/Imu`, of ROS 2 too
+  std::string type;  ///< `sensor_msgs/Imu`, also for ROS 2
   BagEncoding encoding = BagEncoding::kOther;
   std::uint64_t messages = 0;
-  std::string definition;  ///< text of the type; empty if the file does not hold it
+  std::string definition;  ///< text of the message definition; empty if the file does not hold it
 };
 
 struct BagEntry {
   Stamp log_time;
   std::uint32_t topic = 0;  ///< index into topics()
-  std::uint32_t part = 0;   ///< file or chunk, for the format
-  std::uint64_t at = 0;     ///< place in it, for the format
+  std::uint32_t part = 0;   ///< file or chunk; meaning depends on the format
+  std::uint64_t at = 0;     ///< position in it; meaning depends on the format
 };
 
 class BagFile {
@@ -57,14 +57,14 @@ class BagFile {
   /// The body of a message, valid until the next call.
   virtual std::span<const std::uint8_t> read(const BagEntry& entry) = 0;
 
-  /// InputError where a stamp of this topic is out of range (stamp_range.hpp).
+  /// InputError if a stamp of this topic is out of range (stamp_range.hpp).
   void checkStamp(std::uint32_t topic, Stamp stamp) const;
 
  protected:
   /// The topic with this name, type and encoding; added if there is none.
   std::uint32_t topicOf(std::string_view name, std::string_view type, BagEncoding encoding,
                         std::string_view definition);
-  /// Once all entries are there: orders and counts them.
+  /// Sorts and counts the entries. Call once all of them are added.
   void orderEntries();
 
   std::string path_;
@@ -73,10 +73,10 @@ class BagFile {
   std::vector<std::string> warnings_;
 };
 
-/// True for a rosbag2 folder, and for a file that starts like a bag of any kind, also compressed with zstd.
+/// True for a rosbag2 folder and for a file whose first bytes are those of a bag, also compressed with zstd.
 [[nodiscard]] bool isBag(const std::string& path);
 
-/// Told by content. InputError also where the build has no reader for it.
+/// The kind is detected from the content. InputError also if this build has no reader for it.
 [[nodiscard]] std::unique_ptr<BagFile> openBag(const std::string& path);
 
 }  // namespace swiftlet

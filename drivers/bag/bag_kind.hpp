@@ -1,5 +1,5 @@
 #pragma once
-// What kind of bag a file is, told by its first bytes.
+// Detects the kind of a bag from its first bytes.
 
 #include <cstdint>
 #include <string>

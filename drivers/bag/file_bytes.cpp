@@ -14,7 +14,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kWindow = std::size_t{16} << 10U;  // bytes; message indexes of a chunk fit in
+constexpr std::size_t kWindow = std::size_t{16} << 10U;  // bytes; the message indexes of a chunk fit in it
 
 }  // namespace
 

@@ -1,9 +1,8 @@
 #pragma once
-// Bytes of a file by their place, through a small window, so that records one behind the other cost few
-// reads.
+// Random access to the bytes of a file through a small window, so that consecutive records need few reads.
 //
-// Errors: InputError if the file cannot be opened or read. What lies past the end is left out of an
-// answer.
+// Errors: InputError if the file cannot be opened or read. A request beyond the end returns only the bytes
+// that exist.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,9 +21,9 @@ class FileBytes {
   ~FileBytes();
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
-  /// At most `length` bytes from `offset`, valid until the next call.
+  /// Returns at most `length` bytes from `offset`, valid until the next call.
   std::span<const std::uint8_t> at(std::uint64_t offset, std::size_t length);
-  /// The same without a copy into the window, for large reads.
+  /// Like at(), but without the copy into the window; for large reads.
   void read(std::uint64_t offset, std::size_t length, std::vector<std::uint8_t>& out) const;
 
  private:

@@ -22,7 +22,8 @@ using Bytes = std::span<const std::uint8_t>;
 using mcap::Op;
 
 constexpr std::uint32_t kNoChunk = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint64_t kMostUnpacked = std::uint64_t{1} << 30U;  // bytes of a chunk; writers make 1 to 4 MiB
+constexpr std::uint64_t kMostUnpacked = std::uint64_t{1} << 30U;  // largest chunk [bytes]; writers make 1 to
+                                                                  // 4 MiB
 constexpr std::size_t kChunksKept = 4;
 
 std::string_view textOf(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
@@ -57,10 +58,10 @@ class McapFile final : public BagFile {
   };
   struct Chunk {
     std::uint64_t record = 0;  ///< byte where its record begins
-    std::uint64_t data = 0;    ///< byte where its packed records begin
+    std::uint64_t data = 0;    ///< byte where its compressed records begin
     std::uint64_t packed = 0;
     std::uint64_t unpacked = 0;
-    std::uint32_t crc = 0;  ///< 0: none
+    std::uint32_t crc = 0;  ///< 0: no checksum
     Packing packing = Packing::kNone;
   };
   struct Unpacked {
@@ -87,17 +88,17 @@ class McapFile final : public BagFile {
   Bytes unpackedChunk(std::uint32_t chunk);
 
   FileBytes file_;
-  bool finished_ = false;      ///< footer and magic stand at the end
+  bool finished_ = false;      ///< footer and magic are present at the end
   std::uint64_t footer_ = 0;   ///< byte where the footer begins
   std::uint64_t summary_ = 0;  ///< byte where the summary begins; 0: none
   bool counted_ = false;       ///< the summary has statistics
-  std::uint64_t count_ = 0;    ///< messages by them
-  bool outside_ = false;       ///< messages stand outside of chunks
+  std::uint64_t count_ = 0;    ///< number of messages in the statistics
+  bool outside_ = false;       ///< some messages are outside of chunks
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, Channel> channels_;
   std::vector<Chunk> chunks_;
-  std::size_t before_chunk_ = 0;  ///< entries before those of the newest chunk
-  bool chunk_open_ = false;       ///< indexes of the newest chunk may follow
+  std::size_t before_chunk_ = 0;  ///< number of entries before those of the newest chunk
+  bool chunk_open_ = false;       ///< further indexes of the newest chunk may follow
   std::array<Unpacked, kChunksKept> kept_;
   std::uint64_t uses_ = 0;
   std::vector<std::uint8_t> packed_;
@@ -207,7 +208,7 @@ void McapFile::takeStatistics(Bytes content, std::uint64_t place) {
 
 void McapFile::endEarly(std::uint64_t at) {
   if (finished_) fail(at, "a record extends past the data");
-  // What is known of the newest chunk may be half of its indexes.
+  // Some indexes of the newest chunk may be missing: read its records instead.
   if (chunk_open_) {
     entries_.resize(before_chunk_);
     scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
@@ -251,7 +252,7 @@ void McapFile::walk() {
         if (content + length != (summary_ != 0 ? summary_ : footer_)) fail(at, "the data is truncated");
         return checkData(at, LittleFieldReader(file_.at(content, small)).u32());
       default:
-        break;  // attachments, metadata, and kinds to come
+        break;  // attachments, metadata and future kinds
     }
     at = content + length;
   }
@@ -269,7 +270,7 @@ void McapFile::checkData(std::uint64_t data_end, std::uint32_t crc) {
 }
 
 void McapFile::takeChunk(std::uint64_t record, std::uint64_t content, std::uint64_t length) {
-  constexpr std::size_t kMostHead = 64;  // bytes; the name of the packing is 4 at most
+  constexpr std::size_t kMostHead = 64;  // bytes; the compression's name has at most 4
   LittleFieldReader reader(
       file_.at(content, static_cast<std::size_t>(std::min<std::uint64_t>(length, kMostHead))));
   Chunk chunk;
@@ -298,7 +299,7 @@ void McapFile::takeChunk(std::uint64_t record, std::uint64_t content, std::uint6
   chunks_.push_back(chunk);
 }
 
-/// Of chunks that no index follows the records are looked at.
+/// Reads the records of a chunk that has no index.
 void McapFile::closeChunk() {
   chunk_open_ = false;
   if (entries_.size() == before_chunk_) scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);

@@ -1,9 +1,9 @@
 #pragma once
-// An MCAP file: chunks without packing, with LZ4 or zstd, messages outside of chunks, indexed or not,
-// finished or not. Layout: drivers/bag/mcap_records.hpp.
+// Reads MCAP files: chunks uncompressed or compressed with LZ4 or zstd, messages outside of chunks, with or
+// without index, finished or not. Layout: drivers/bag/mcap_records.hpp.
 //
-// Opening walks over the records; chunks with a message index are not unpacked. Checksums of chunks are
-// compared when they are read, that of the summary when the file is opened, that of the data only where
+// Opening walks over the records; chunks with a message index are not decompressed. Checksums of chunks are
+// verified when they are read, that of the summary when the file is opened, and that of the data only if
 // messages lie outside of chunks.
 
 #include <memory>

@@ -1,5 +1,5 @@
 #pragma once
-// What reader and writer of MCAP files agree on. All numbers are little-endian.
+// Layout shared by the reader and the writer of MCAP files. All numbers are little-endian.
 // Source: the MCAP specification, version 0 (github.com/foxglove/mcap, website/docs/spec).
 
 #include <array>

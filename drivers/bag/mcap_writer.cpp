@@ -24,13 +24,13 @@ using Bytes = std::span<const std::uint8_t>;
 using mcap::Op;
 
 constexpr std::size_t kChunkBytes = std::size_t{1}
-                                    << 20U;  // rosbag2's size too: some images, or seconds of IMU
+                                    << 20U;  // as in rosbag2: holds some images, or seconds of IMU
 
 std::uint32_t crcOf(std::uint32_t crc, Bytes bytes) {
   return static_cast<std::uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
 }
 
-/// Records one behind the other.
+/// A buffer of consecutive records.
 class Records {
  public:
   template <typename Fill>
@@ -82,7 +82,7 @@ class McapWriter final : public BagWriter {
   [[nodiscard]] BagEncoding encoding() const override { return BagEncoding::kCdr; }
 
   std::uint32_t addTopic(const BagWriterTopic& topic) override {
-    // What a reader of a cut file needs stands in front of the first message.
+    // Schema and channel are written before the first message, so that a cut file can be read.
     if (!schemas_.contains(topic.type)) {
       schemas_.emplace(topic.type, static_cast<std::uint16_t>(schemas_.size() + 1));
       addSchema(chunk_, topic);
@@ -128,7 +128,7 @@ class McapWriter final : public BagWriter {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
   struct Channel {
-    Records index;  ///< of the chunk that is being filled
+    Records index;  ///< of the chunk being filled
     std::uint64_t messages = 0;
   };
 
@@ -261,8 +261,8 @@ class McapWriter final : public BagWriter {
   std::unique_ptr<std::FILE, FileCloser> file_;
   std::uint64_t at_ = 0;   ///< bytes written
   std::uint32_t crc_ = 0;  ///< of the data, later of the summary
-  Records records_;        ///< about to be written
-  Records chunk_;          ///< that is being filled
+  Records records_;        ///< waiting to be written
+  Records chunk_;          ///< being filled
   std::uint64_t chunk_messages_ = 0, chunk_first_ = 0, chunk_last_ = 0;
   std::map<std::string, std::uint16_t> schemas_;  ///< numbers by type
   std::vector<Channel> channels_;

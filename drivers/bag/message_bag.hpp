@@ -1,6 +1,5 @@
 #pragma once
-// Messages by their types into a bag of any kind: topics are made with their definitions when they first
-// come.
+// Writes typed messages into a bag of any kind. A topic is added with its definition at its first message.
 
 #include <cstdint>
 #include <limits>
@@ -20,7 +19,7 @@ class MessageBag {
  public:
   explicit MessageBag(std::unique_ptr<BagWriter> writer) : writer_(std::move(writer)) {}
 
-  /// True for stamps that the bag's messages can hold: from 1 ns to 2106 (ROS 1) or 2038 (ROS 2).
+  /// True if the bag's messages can hold the stamp: from 1 ns to 2106 (ROS 1) or 2038 (ROS 2).
   [[nodiscard]] bool holds(Stamp stamp) const {
     const std::int64_t seconds = stamp.ns / rosmsg::kNsPerSecond;
     return stamp.ns > 0 &&
@@ -28,8 +27,8 @@ class MessageBag {
                                                       : seconds < std::numeric_limits<std::int32_t>::max());
   }
 
-  /// In the order of the stamps. A header's `seq` counts the messages of its topic. `latched`: players repeat
-  /// the topic's last message to late subscribers.
+  /// Call in the order of the stamps. A header's `seq` counts the messages of its topic. `latched`: players
+  /// repeat the topic's last message to late subscribers.
   template <rosmsg::Message T>
   void write(const std::string& name, Stamp stamp, T message, bool latched = false) {
     const auto [place, is_new] = topics_.try_emplace(name);
@@ -46,7 +45,7 @@ class MessageBag {
 
   void finish() { writer_->finish(); }
 
-  /// Messages by topic.
+  /// Number of messages by topic name.
   [[nodiscard]] std::map<std::string, std::uint64_t> counts() const {
     std::map<std::string, std::uint64_t> counts;
     for (const auto& [name, topic] : topics_) counts[name] = topic.messages;

@@ -1,12 +1,13 @@
 #pragma once
-// Bodies of ROS messages from and to the structures of drivers/bag/ros_messages.hpp, by a visitor over their
-// fields.
+// Encodes and decodes the bodies of ROS messages to and from the structures of drivers/bag/ros_messages.hpp,
+// with a visitor over their fields.
 //
 // ROS 1: packed, little-endian; strings and arrays begin with a 32-bit length.
-// ROS 2: XCDR version 1, plain: four bytes of header, of which the second says the byte order; each number is
-// aligned to its size behind the header; a string's length counts its NUL. Both byte orders are read.
-// Errors: false for a body that ends early or is no such encoding. Every read is bounds-checked.
-// Memory: of the message; arrays of bytes are views into the body.
+// ROS 2: XCDR version 1, plain: a header of four bytes, the second of which is the byte order; each number is
+// aligned to its size, counted from the end of the header; a string's length includes its NUL. Both byte
+// orders are read.
+// Errors: false for a body that ends early or has another encoding. Every read is bounds-checked.
+// Memory: that of the message; byte arrays are views into the body.
 
 #include <algorithm>
 #include <array>
@@ -28,7 +29,7 @@ namespace swiftlet {
 template <typename T>
 concept RosNumber = std::is_arithmetic_v<T>;
 
-/// Reads the bytes of one message in any encoding of lengths.
+/// Reads the fields of one message from its bytes.
 template <bool kIsRos1>
 class MessageReader {
  public:
@@ -70,7 +71,7 @@ class MessageReader {
     std::uint32_t nanoseconds = 0;
     (*this)(name, seconds);
     (*this)(name, nanoseconds);
-    // ROS 1 counts without sign, to the year 2106.
+    // ROS 1 seconds are unsigned, up to the year 2106.
     const std::int64_t whole =
         kRos1 ? static_cast<std::int64_t>(static_cast<std::uint32_t>(seconds)) : seconds;
     stamp.ns = whole * rosmsg::kNsPerSecond + nanoseconds;
@@ -97,7 +98,7 @@ class MessageReader {
   template <typename T>
   void operator()(const char* name, std::vector<T>& values) {
     values.clear();
-    // Every element takes a byte at least: a wrong length ends with the body.
+    // Every element takes at least one byte, so a wrong length stops at the end of the body.
     for (std::size_t left = length(); left > 0 && good_; --left) (*this)(name, values.emplace_back());
   }
   template <rosmsg::Message T>
@@ -127,8 +128,8 @@ class MessageReader {
   bool good_ = true;
 };
 
-/// False if the body is not a complete message of this type. For `Header`: of any message that starts with
-/// one.
+/// False if the body is not a complete message of this type. `Header` can be decoded from any message that
+/// starts with one.
 template <rosmsg::Message T>
 [[nodiscard]] bool decode(std::span<const std::uint8_t> body, BagEncoding encoding, T& message) {
   const auto read = [&](auto reader) {
@@ -152,7 +153,7 @@ class MessageWriter {
   template <RosNumber T>
   void operator()(const char* /*name*/, T value) {
     static_assert(std::endian::native == std::endian::little, "numbers are copied as they are");
-    // The header's four bytes do not count for the alignment.
+    // Alignment is counted from the end of the four-byte header.
     if constexpr (!kRos1) bytes_.resize(4 + (bytes_.size() - 4 + sizeof(T) - 1) / sizeof(T) * sizeof(T));
     const auto word = std::bit_cast<std::array<std::uint8_t, sizeof(T)>>(value);
     bytes_.insert(bytes_.end(), word.begin(), word.end());

@@ -1,6 +1,6 @@
 #pragma once
-// The definition of a message as the text of its .msg file, with the definitions of all that it is made of
-// behind it, as bags hold it: each headed by a line of 80 `=` and a line `MSG: package/Type`.
+// The definition of a message as the text of its .msg file followed by the definitions of all nested types,
+// as bags store it: each of these is preceded by a line of 80 `=` and a line `MSG: package/Type`.
 
 #include <array>
 #include <cstdint>
@@ -88,7 +88,7 @@ class DefinitionWriter {
     }
   }
 
-  /// Types of nested fields must be described too, once.
+  /// Collects the definition of each nested type once.
   template <typename T>
   void note() {
     if constexpr (Array<T>::value) {

@@ -1,4 +1,4 @@
-// Stands in for ros1_file.cpp in builds without rosbag-storage.
+// Replaces ros1_file.cpp in builds without rosbag-storage.
 
 #include "drivers/bag/ros1_file.hpp"
 #include "drivers/input/input_error.hpp"

@@ -8,9 +8,9 @@ std::string ros2Type(std::string_view type) {
 }
 
 std::string qosText(bool latched) {
-  // Without any a player takes its defaults: reliable, volatile, the last 10.
+  // With an empty text a player uses its defaults: reliable, volatile, the last 10.
   if (!latched) return "";
-  // Numbers of rmw's enumerations: keep last, reliable, transient local, automatic; the longest time is
+  // Values of rmw's enumerations: keep last, reliable, transient local, automatic. The longest duration means
   // "never".
   constexpr std::string_view kNever = "    sec: 9223372036\n    nsec: 854775807\n";
   std::string text = "- history: 1\n  depth: 1\n  reliability: 1\n  durability: 1\n";

@@ -1,15 +1,15 @@
 #pragma once
-// What rosbag2 keeps of a topic beside its messages.
+// What rosbag2 stores about a topic besides its messages.
 
 #include <string>
 #include <string_view>
 
 namespace swiftlet {
 
-/// `sensor_msgs/msg/Imu` of `sensor_msgs/Imu`.
+/// ROS 2 type name: `sensor_msgs/Imu` becomes `sensor_msgs/msg/Imu`.
 [[nodiscard]] std::string ros2Type(std::string_view type);
 
-/// The qualities of service that a player offers. Latched: late subscribers receive the last message.
+/// Quality of service for players, as YAML. Latched: late subscribers receive the last message.
 [[nodiscard]] std::string qosText(bool latched);
 
 }  // namespace swiftlet

@@ -10,7 +10,7 @@
 namespace swiftlet {
 namespace {
 
-/// A message of any type, by its bytes; what the traits below answer when a bag first sees a topic.
+/// A message of any type as bytes; the traits below give its type when rosbag first sees a topic.
 struct RawMessage {
   const BagWriterTopic* topic = nullptr;
   std::span<const std::uint8_t> body;
@@ -107,7 +107,7 @@ class Ros1Writer final : public BagWriter {
     try {
       bag_->close();
     } catch (const rosbag::BagException&) {
-      // Leaked on purpose: its destructor would close it again, and throw.
+      // Leaked on purpose: its destructor would try to close it again and throw.
       static_cast<void>(bag_.release());
     }
   }
@@ -117,7 +117,7 @@ class Ros1Writer final : public BagWriter {
   std::uint32_t addTopic(const BagWriterTopic& topic) override {
     Topic added{topic, nullptr};
     if (topic.latched) {
-      // What a player needs to repeat the last message to who comes late.
+      // A player needs this to repeat the last message to late subscribers.
       added.fields = boost::make_shared<ros::M_string>();
       (*added.fields)["topic"] = topic.name;
       (*added.fields)["type"] = topic.type;
@@ -141,7 +141,7 @@ class Ros1Writer final : public BagWriter {
   void finish() override {
     translated([&] {
       bag_->close();
-      // A full disk shows when the file is closed, and rosbag does not look.
+      // rosbag does not report a disk that fills up while closing, so the file is checked.
       rosbag::Bag written(path_, rosbag::bagmode::Read);
       if (rosbag::View(written).size() != messages_) {
         throw rosbag::BagIOException("messages are missing in the written file");

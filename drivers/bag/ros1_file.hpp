@@ -1,5 +1,5 @@
 #pragma once
-// ROS 1 bags (format 2.0) through rosbag-storage, read and written; present only in builds that found it.
+// Reads and writes ROS 1 bags (format 2.0) with rosbag-storage; functional only in builds that found it.
 
 #include <memory>
 #include <string>
@@ -12,7 +12,7 @@ namespace swiftlet {
 /// `name` names the file in messages. InputError in builds without rosbag-storage.
 [[nodiscard]] std::unique_ptr<BagFile> openRos1File(const std::string& path, const std::string& name);
 
-/// Not compressed.
+/// Writes without compression.
 [[nodiscard]] std::unique_ptr<BagWriter> makeRos1Writer(const std::string& path);
 
 /// False in builds without rosbag-storage.

@@ -1,11 +1,11 @@
 #pragma once
-// The messages of ROS that swiftlet reads and writes, as structures of their fields in order. One visitor
-// each encodes, decodes (drivers/bag/message_coder.hpp) and prints the definition
+// The ROS messages that swiftlet reads and writes, as structures with their fields in order. One visitor each
+// encodes and decodes (drivers/bag/message_coder.hpp) and prints the definition
 // (drivers/bag/message_text.hpp), for ROS 1 and ROS 2.
 //
-// Units and frames are those of ROS: rad/s, m/s^2, m; a header's frame is named, not resolved.
-// Source: the .msg files of common_msgs (ROS 1) and common_interfaces (ROS 2 Humble). kMd5: ROS 1's sum of a
-// definition, which its tools compare.
+// Units and frames are those of ROS: rad/s, m/s^2, m. A header's frame is only a name here. Source: the .msg
+// files of common_msgs (ROS 1) and common_interfaces (ROS 2 Humble). kMd5: the checksum of a definition in
+// ROS 1, which its tools compare.
 
 #include <array>
 #include <concepts>
@@ -38,7 +38,7 @@ struct Duration {
 
 struct Header {
   static constexpr const char* kType = "std_msgs/Header";
-  std::uint32_t seq = 0;  ///< ROS 1 alone has it
+  std::uint32_t seq = 0;  ///< ROS 1 only
   Stamp stamp;
   std::string frame_id;
 
@@ -226,10 +226,10 @@ struct Imu {
   static constexpr const char* kMd5 = "6a62c6daae103f4ff57a132d6f95cec2";
   Header header;
   Quaternion orientation;
-  std::array<double, 9> orientation_covariance = {-1};  ///< first element -1: there is no orientation
+  std::array<double, 9> orientation_covariance = {-1};  ///< first element -1: no orientation
   Vector3 angular_velocity;                             ///< rad/s
   std::array<double, 9> angular_velocity_covariance = {};
-  Vector3 linear_acceleration;  ///< m/s^2, with gravity's reaction
+  Vector3 linear_acceleration;  ///< m/s^2, specific force: includes the reaction to gravity
   std::array<double, 9> linear_acceleration_covariance = {};
 
   template <typename Self, typename Visit>
@@ -252,7 +252,7 @@ struct Image {
   std::uint32_t width = 0;
   std::string encoding;
   std::uint8_t is_bigendian = 0;
-  std::uint32_t step = 0;              ///< bytes from row to row
+  std::uint32_t step = 0;              ///< bytes per row
   std::span<const std::uint8_t> data;  ///< decoded: a view into the body
 
   template <typename Self, typename Visit>
@@ -343,7 +343,7 @@ struct PointField {
   static constexpr const char* kType = "sensor_msgs/PointField";
   static constexpr std::uint8_t kUint32 = 6, kFloat32 = 7;
   std::string name;
-  std::uint32_t offset = 0;  ///< bytes from the beginning of a point
+  std::uint32_t offset = 0;  ///< bytes from the start of a point
   std::uint8_t datatype = 0;
   std::uint32_t count = 1;
 
@@ -371,7 +371,7 @@ struct PointCloud2 {
   std::uint32_t width = 0;
   std::vector<PointField> point_fields;
   bool is_bigendian = false;
-  std::uint32_t point_step = 0;  ///< bytes of a point
+  std::uint32_t point_step = 0;  ///< bytes per point
   std::uint32_t row_step = 0;
   std::vector<std::uint8_t> data;
   bool is_dense = true;
@@ -440,16 +440,16 @@ struct Marker {
   Pose pose;
   Vector3 scale;
   ColorRGBA color;
-  Duration lifetime;  ///< zero: for ever
+  Duration lifetime;  ///< zero: forever
   bool frame_locked = false;
   std::vector<Point> points;
   std::vector<ColorRGBA> colors;
-  std::string texture_resource;  ///< to uv_coordinates: ROS 2 alone has them
+  std::string texture_resource;  ///< this and the next ones up to uv_coordinates: ROS 2 only
   CompressedImage texture;
   std::vector<UVCoordinate> uv_coordinates;
   std::string text;
   std::string mesh_resource;
-  MeshFile mesh_file;  ///< ROS 2 alone has it
+  MeshFile mesh_file;  ///< ROS 2 only
   bool mesh_use_embedded_materials = false;
 
   template <typename Self, typename Visit>

@@ -25,7 +25,7 @@ bool isStorage(const fs::path& file) {
   return name.extension() == ".db3" || name.extension() == ".mcap";
 }
 
-/// The number before the ending: rosbag2 counts the files of a bag.
+/// The number at the end of the stem: rosbag2 numbers the files of a bag.
 std::uint64_t numberOf(const std::string& name) {
   const std::string stem = name.substr(0, name.find('.'));
   std::size_t digits = 0;
@@ -80,7 +80,7 @@ class Rosbag2Folder final : public BagFile {
  private:
   void add(const std::string& name) {
     fs::path file = fs::path(path_) / name;
-    // Older recorders put the folder's name before the file's.
+    // Older recorders list the file with the folder's name in front.
     if (!fs::exists(file)) file = fs::path(path_) / fs::path(name).filename();
     if (!fs::exists(file)) {
       throw InputError(file.string(), 0, "", "is listed in metadata.yaml but does not exist",

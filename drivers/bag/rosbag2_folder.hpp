@@ -1,9 +1,9 @@
 #pragma once
-// The folder of a rosbag2 bag: metadata.yaml (versions 1 to 9) and the files that it lists, SQLite or MCAP,
-// each perhaps packed as a whole with zstd.
+// Reads the folder of a rosbag2 bag: metadata.yaml (versions 1 to 9) and the files that it lists, SQLite or
+// MCAP, each optionally compressed as a whole with zstd.
 //
-// Which files there are is all that is taken from metadata.yaml; what a file is, its own bytes say. A folder
-// whose recorder was killed has no metadata.yaml: its files are then read in the order of their numbers.
+// Only the list of files is taken from metadata.yaml; the kind of each file is detected from its bytes. If
+// the recorder was killed there is no metadata.yaml: the files are then read in the order of their numbers.
 
 #include <memory>
 #include <string>
@@ -16,10 +16,10 @@ namespace swiftlet {
 
 struct Rosbag2Metadata {
   std::vector<std::string> files;  ///< relative to the folder
-  std::uint64_t messages = 0;      ///< by the recorder's count
+  std::uint64_t messages = 0;      ///< as counted by the recorder
 };
 
-/// `name` names the file in messages. InputError for what is no such text.
+/// `name` names the file in messages. InputError if the text is not rosbag2 metadata.
 [[nodiscard]] Rosbag2Metadata parseRosbag2Metadata(const std::string& name, std::string_view text);
 
 [[nodiscard]] bool isRosbag2Folder(const std::string& path);

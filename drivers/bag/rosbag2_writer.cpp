@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// metadata.yaml of version 5 and schema 3, as Humble writes them: it and all later releases read both.
+/// Writes metadata.yaml version 5 and database schema 3 like Humble; all later releases read both.
 class Rosbag2Writer final : public BagWriter {
  public:
   Rosbag2Writer(const std::string& folder, const std::string& name)
@@ -25,7 +25,7 @@ class Rosbag2Writer final : public BagWriter {
         file_(name + "_0.db3"),
         database_((fs::create_directories(folder), fs::path(folder) / file_).string(),
                   (fs::path(folder) / file_).string(), SqliteDatabase::Mode::kCreate) {
-    // The file is renamed when it is whole: nothing is gained by a journal.
+    // The caller renames the complete file, so a journal is not needed.
     database_.execute(
         "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN;"
         "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"

@@ -14,7 +14,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kMostMessage = std::size_t{1} << 30U;  // bytes; SQLite's own limit for a blob
+constexpr std::size_t kMostMessage = std::size_t{1} << 30U;  // bytes; SQLite's own limit of a blob
 
 constexpr const char* kDamaged =
     "The file is damaged: copy it again, or recover the intact part with `sqlite3 FILE .recover | sqlite3 "
@@ -55,7 +55,7 @@ class SqliteBag final : public BagFile {
                      ".recover | sqlite3 NEW`");
   }
 
-  /// SQLite itself fills up a last page that was cut with zeros.
+  /// Detects a cut file: SQLite itself would fill up an incomplete last page with zeros.
   void checkPages(const std::string& path) const {
     constexpr std::size_t kPageSizeAt = 16;  // of the file's header; big-endian, 1 stands for 65536
     FileBytes file(path, path_);

@@ -1,5 +1,5 @@
 #pragma once
-// One SQLite file of a rosbag2 bag: tables `topics` and `messages`, the same in schema versions 1 to 4.
+// Reads one SQLite file of a rosbag2 bag: tables `topics` and `messages`, which schema versions 1 to 4 share.
 //
 // Messages compressed individually with zstd are recognized by their first bytes. SQLite files have no
 // checksums: a flipped byte inside a message is not detected here.

@@ -20,7 +20,7 @@ namespace {
                            : "Check that it exists and that this user can read it and write beside it");
 }
 
-/// As a URI, where some characters mean something.
+/// The path as a URI, with reserved characters escaped.
 std::string uriOf(const std::string& path, bool alone) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
@@ -92,7 +92,7 @@ SqliteDatabase::SqliteDatabase(const std::string& path, std::string name, Mode m
   if (mode == Mode::kCreate) {
     result = sqlite3_open_v2(path.c_str(), &made, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   } else {
-    // Nobody changes a file alone: so it is read from folders that nobody may write to.
+    // Without a log beside it the file is opened as immutable, so that read-only folders work.
     const bool alone = !fs::exists(path + "-wal") && !fs::exists(path + "-journal");
     result =
         sqlite3_open_v2(uriOf(path, alone).c_str(), &made, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);

@@ -1,5 +1,5 @@
 #pragma once
-// SQLite with owners, and errors as InputError.
+// SQLite handles with RAII; errors are InputError.
 
 #include <sqlite3.h>
 
@@ -14,7 +14,7 @@ namespace swiftlet {
 class SqliteStatement {
  public:
   SqliteStatement(sqlite3* database, const std::string& name, std::string_view text);
-  /// True while there are rows. `place` of an error: `where` and its number.
+  /// True while there are rows. `where` and `number` locate an error in its message.
   bool step(const char* where, std::int64_t number);
   void reset();
 
@@ -36,13 +36,13 @@ class SqliteStatement {
 class SqliteDatabase {
  public:
   enum class Mode : std::uint8_t { kRead, kCreate };
-  /// kRead: a write-ahead log beside the file (`-wal`) is part of it. `name` names the file in messages.
+  /// kRead: includes a write-ahead log beside the file (`-wal`). `name` names the file in messages.
   SqliteDatabase(const std::string& path, std::string name, Mode mode);
 
   [[nodiscard]] SqliteStatement prepare(std::string_view text) const;
   void execute(const std::string& text) const;
   [[nodiscard]] bool hasTable(std::string_view table) const;
-  /// For a writer: what could not be written shows at the latest here.
+  /// For writers: remaining write errors are reported here.
   void close();
 
  private:

@@ -18,8 +18,8 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kFirstRoom = std::size_t{1} << 20U;  // bytes; a usual chunk
-// Images hardly shrink: the fastest level packs raw grey to two thirds at some 400 MB/s.
+constexpr std::size_t kFirstRoom = std::size_t{1} << 20U;  // bytes; size of a usual chunk
+// Images hardly compress: the fastest level reduces raw grey to two thirds at about 400 MB/s.
 constexpr int kZstdLevel = 1;
 
 struct FileCloser {
@@ -30,12 +30,12 @@ using File = std::unique_ptr<std::FILE, FileCloser>;
 using Zstd = std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)>;
 Zstd makeZstd() { return {ZSTD_createDStream(), &ZSTD_freeDStream}; }
 
-/// `step(to, room, written)` unpacks some; false on damage, `done` at the end of the packed bytes.
+/// `step(to, room, written, done)` unpacks a piece; it returns false on damage and sets `done` at the end.
 template <typename Step>
 bool unpackGrowing(std::size_t most, std::vector<std::uint8_t>& out, Step&& step) {
   std::size_t size = 0;
   for (bool done = false; !done;) {
-    // One byte more than allowed shows what is too long.
+    // One byte more than allowed, to detect output that is too long.
     if (size == out.size()) out.resize(std::min(std::max(2 * size, kFirstRoom), most + 1));
     std::size_t written = 0;
     if (!step(out.data() + size, out.size() - size, written, done)) return false;
@@ -49,7 +49,7 @@ bool unpackGrowing(std::size_t most, std::vector<std::uint8_t>& out, Step&& step
 bool unpackZstd(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
   const Zstd stream = makeZstd();
   ZSTD_inBuffer in = {packed.data(), packed.size(), 0};
-  std::size_t left = 1;  // of the frame; 0 at its end
+  std::size_t left = 1;  // bytes of the frame still expected; 0 at its end
   return unpackGrowing(most, out, [&](std::uint8_t* to, std::size_t room, std::size_t& written, bool& done) {
     ZSTD_outBuffer target = {to, room, 0};
     const std::size_t before = in.pos;
@@ -153,7 +153,7 @@ std::vector<std::uint8_t> packZstd(std::span<const std::uint8_t> bytes) {
 }
 
 std::string unpackedBegin(const std::string& packed, std::size_t most) {
-  // A frame's first block and its head.
+  // Enough for the frame's header and first block.
   std::string from(ZSTD_DStreamInSize(), '\0');
   std::ifstream file(packed, std::ios::binary);
   file.read(from.data(), static_cast<std::streamsize>(from.size()));

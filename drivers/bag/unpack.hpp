@@ -1,8 +1,8 @@
 #pragma once
-// Packed bytes of bags: zstd and LZ4 frames.
+// Decompresses zstd and LZ4 frames of bags.
 //
-// Errors: false, with nothing promised about `out`; memory grows with what really comes out, so that a
-// wrong length in a file costs nothing.
+// Errors: false, and `out` is then unspecified. Memory grows with the actual output, so a wrong length in a
+// file allocates nothing.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,24 +14,24 @@ namespace swiftlet {
 
 enum class Packing : std::uint8_t { kNone, kLz4, kZstd };
 
-/// Unpacks all of `packed`, which must give exactly `size` bytes. False otherwise.
+/// Decompresses all of `packed`; false unless the result has exactly `size` bytes.
 [[nodiscard]] bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t size,
                           std::vector<std::uint8_t>& out);
 
-/// One zstd message of unknown size, at most `most` bytes.
+/// Decompresses one zstd message of unknown size, at most `most` bytes.
 [[nodiscard]] bool unpackZstdMessage(std::span<const std::uint8_t> packed, std::size_t most,
                                      std::vector<std::uint8_t>& out);
 
-/// True if the bytes begin like a zstd frame.
+/// True if the bytes start like a zstd frame.
 [[nodiscard]] bool isZstd(std::span<const std::uint8_t> bytes);
 
 [[nodiscard]] std::vector<std::uint8_t> packZstd(std::span<const std::uint8_t> bytes);
 
-/// The first bytes of a file that was packed as a whole with zstd, at most `most`; fewer where it is damaged.
+/// At most the first `most` bytes of a file compressed as a whole with zstd; fewer if it is damaged.
 [[nodiscard]] std::string unpackedBegin(const std::string& packed, std::size_t most);
 
-/// A file that was packed as a whole, unpacked into the system's folder for temporary files and removed with
-/// this object; who has it open may read on. InputError for damage and for a full disk.
+/// A file compressed as a whole, decompressed into the system's temporary folder and removed with this
+/// object; files opened before stay readable. InputError for damage and for a full disk.
 class UnpackedFile {
  public:
   explicit UnpackedFile(const std::string& packed);
