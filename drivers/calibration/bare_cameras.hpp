@@ -1,6 +1,6 @@
 #pragma once
-// Calibrations of cameras alone (ROS CameraInfo, OpenCV): joined to a rig by an IMU file beside them, which
-// has the noise and the place of camera 0. Private to this folder.
+// Calibrations that contain only cameras (ROS CameraInfo, OpenCV). An IMU file beside them, with the noise
+// and the pose of camera 0, completes the rig. Private to this folder.
 
 #include "drivers/calibration/sensor_fields.hpp"
 
@@ -9,7 +9,7 @@ namespace swiftlet {
 struct BareCameras {
   std::string form;
   std::vector<CameraEntry> cameras;  ///< without extrinsics
-  std::optional<SE3> T_cam1_cam0;    ///< of a pair that was calibrated together
+  std::optional<SE3> T_cam1_cam0;    ///< of a pair that was calibrated together, else empty
 };
 
 /// The fields of an IMU file, flat or nested under `imu0` as Kalibr writes it.
@@ -18,7 +18,7 @@ struct BareCameras {
 /// Whether an IMU file states that the images of the log are rectified.
 [[nodiscard]] bool readsRectified(const YamlField& imu);
 
-/// InputError names what of the IMU file is missing and how to write it.
+/// InputError names what the IMU file lacks and how to write it.
 [[nodiscard]] Calibration joinToImu(const BareCameras& bare, const YamlField& imu, Warnings warnings,
                                     const CalibrationOptions& options);
 

@@ -1,5 +1,5 @@
-// Basalt's calibration JSON: cameras, extrinsics and IMU in one file. A JSON text is a YAML text, so that
-// errors have their lines.
+// Basalt's calibration JSON: cameras, extrinsics and IMU in one file. JSON is read as YAML, so errors have
+// line numbers.
 
 #include <fmt/format.h>
 
@@ -69,7 +69,7 @@ LensFit basaltLens(const YamlField& camera, const std::array<int, 2>& size, Warn
   return acceptLens(values.place(), lens, warnings);
 }
 
-/// One number, or the largest of three axes.
+/// A single number, or the largest of three axes.
 double densityOf(const YamlField& field) {
   const std::vector<double> values = field.isList() ? field.numbers() : std::vector<double>{field.number()};
   const double largest = values.empty() ? 0 : *std::max_element(values.begin(), values.end());

@@ -54,7 +54,7 @@ FileKind kindOf(FileTree& tree, const std::string& path) {
     if (matrix && lens) return FileKind::kOpenCv;
     if (root.has("R") && root.has("T")) return FileKind::kOpenCvPair;
   } catch (const InputError&) {
-    // A file that is no YAML is no calibration either; the search goes on without it.
+    // A file that is not YAML is not a calibration either; the search continues.
   }
   return FileKind::kOther;
 }
@@ -93,7 +93,7 @@ void refuseMore(const FileTree& tree, const std::string& folder, const std::vect
                    "Specify the one to use");
 }
 
-/// A calibration's files: a text of its own tree, or the IMU's wherever the user has it.
+/// A file of a calibration: from the calibration's tree, or the IMU file from any place on disk.
 struct Text {
   std::string name;
   std::string text;
@@ -102,7 +102,7 @@ struct Text {
 
 Text textOf(FileTree& tree, const std::string& path) { return {tree.name(path), readText(tree, path)}; }
 
-/// The IMU file: the given one, on disk, or the one of the folder.
+/// The IMU file: `imu_file` on disk if given, else the one in the folder.
 std::optional<Text> imuOf(FileTree& tree, const std::string& folder, const std::string& imu_file) {
   if (!imu_file.empty()) {
     const fs::path path(imu_file);
@@ -128,7 +128,7 @@ Calibration readEuroc(FileTree& tree, const std::string& mav0, const Calibration
   return parseEurocCalibration(cameras, imu.named(), options);
 }
 
-/// ROS's or OpenCV's files, which hold cameras alone.
+/// Reads ROS or OpenCV files, which contain only cameras.
 Calibration readBare(FileTree& tree, FileKind kind, const std::vector<std::string>& cameras,
                      const std::optional<Text>& imu, const CalibrationOptions& options) {
   if (!imu) {
@@ -151,7 +151,7 @@ bool hasEuroc(const FileTree& tree, const std::string& folder) {
   return tree.isFile(within(folder, "cam0/sensor.yaml"));
 }
 
-/// One file, and for Kalibr, ROS and OpenCV the IMU file beside it in `folder`.
+/// Reads one file; for Kalibr, ROS and OpenCV also the IMU file beside it in `folder`.
 Calibration readFile(FileTree& tree, const std::string& folder, const std::string& path,
                      const std::string& imu_file, const CalibrationOptions& options) {
   const FileKind kind = kindOf(tree, path);
@@ -171,7 +171,7 @@ Calibration readFile(FileTree& tree, const std::string& folder, const std::strin
       return parseKalibrCalibration(text.named(), imu->named(), options);
     }
     default:
-      // Parsing shows what is wrong with it.
+      // Parsing produces a message that shows what is wrong.
       throw YamlField::parse(text.name, text.text)
           .error(
               "not a camera calibration: not a Kalibr camchain, Basalt JSON, ROS camera_info or OpenCV file",

@@ -12,9 +12,9 @@ namespace {
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMatrix34d = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
-/// Of the rectified camera seen from the raw one.
+/// T_rectified_raw: from the raw to the rectified camera frame.
 SE3 rectification(const CameraInfo& info, const InputPlace& place) {
-  Warnings rounding;  // a rectification with few digits is made orthonormal
+  Warnings rounding;  // not used: a rectification with few digits is made orthonormal without a warning
   return checkedTransform(place, Eigen::Map<const RowMatrix3d>(info.R.data()), Eigen::Vector3d::Zero(),
                           rounding);
 }

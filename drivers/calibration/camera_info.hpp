@@ -1,13 +1,13 @@
 #pragma once
-// ROS's sensor_msgs/CameraInfo, from a topic or a file, as the estimator's lens models and as the transform
-// between two cameras.
+// Converts ROS's sensor_msgs/CameraInfo, from a topic or a file, to the estimator's lens models and to the
+// transform between two cameras.
 //
-// A stream carries either raw images, which K and D describe, or rectified ones (`image_rect`), which P
-// describes without distortion. R turns a point from the raw camera's frame into the rectified one's. P(0,3)
-// of the second camera of a pair is -fx times the baseline [px m].
+// A stream carries either raw images, described by K and D, or rectified images (`image_rect`), described by
+// P without distortion. R rotates a point from the raw camera's frame to the rectified one. P(0,3) of the
+// second camera of a pair is -fx times the baseline [px m].
 //
-// Errors: InputError that names `name`, the field and the remedy. Suspicious values and conversions that are
-// not exact add a line to the warnings. Host side only: allocates; a conversion takes some tens of ms.
+// Errors: InputError that names `name`, the field and the remedy. Suspicious values and inexact conversions
+// add a line to the warnings. Host side only: allocates; a conversion takes some tens of ms.
 
 #include <array>
 #include <string>
@@ -31,10 +31,10 @@ struct CameraInfo {
   std::array<double, 12> P{};  ///< row by row [px], last column [px m]
 };
 
-/// Lens of the raw images, and how close it is. `name`: the file or topic, for messages.
+/// Lens of the raw images and the error of its conversion. `name`: the file or topic, for messages.
 [[nodiscard]] LensFit rawLensFit(const CameraInfo& info, const std::string& name, Warnings& warnings);
 
-/// The same; if the conversion is not exact, a warning states its error.
+/// Only the lens; if the conversion is not exact, a warning states its error.
 [[nodiscard]] CameraModel rawLens(const CameraInfo& info, const std::string& name, Warnings& warnings);
 
 /// Lens of the rectified images: P, no distortion.

@@ -19,7 +19,7 @@ void readArray(const YamlField& root, const std::string& key, std::size_t column
 struct InfoFile {
   CameraInfo info;
   std::string file;
-  InputPlace pair;  ///< where a second camera says where the first is
+  InputPlace pair;  ///< where a second camera states its pose relative to the first
 };
 
 InfoFile readInfo(const NamedText& text) {
@@ -55,7 +55,7 @@ Calibration parseCameraInfoCalibration(const std::vector<NamedText>& cameras, co
   std::vector<InfoFile> files;
   files.reserve(cameras.size());
   for (const NamedText& camera : cameras) files.push_back(readInfo(camera));
-  // The camera with a baseline is the second one, whatever the files are called.
+  // The camera with a baseline in P is the second one, whatever the files are called.
   if (files.size() == 2 && files[0].info.P[3] != 0 && files[1].info.P[3] == 0) std::swap(files[0], files[1]);
   BareCameras bare;
   bare.form = "ROS CameraInfo";

@@ -7,7 +7,8 @@
 namespace swiftlet {
 namespace {
 
-// A unit outside is a slip of the pen: whole metres in 16 bits, or less than a micrometre [m].
+// Units outside are mistakes: a unit of metres would waste 16 bits, one below a micrometre is not measurable
+// [m].
 constexpr double kLeastUnit = 1e-6;
 constexpr double kMostUnit = 0.1;
 

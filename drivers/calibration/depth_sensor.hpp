@@ -1,6 +1,6 @@
 #pragma once
-// The sensor.yaml of a depth camera: an ideal pinhole camera, where it sits, and what one unit of its images
-// is. Host side only: allocates and throws InputError with file, line and field.
+// Reads the sensor.yaml of a depth camera: an ideal pinhole camera, its pose, and the unit of its images.
+// Host side only: allocates and throws InputError with file, line and field.
 
 #include <string>
 #include <vector>
@@ -12,11 +12,11 @@ namespace swiftlet {
 
 struct DepthSensor {
   PinholeIntrinsics camera;
-  SE3 T_body_camera;              ///< body: as the file has it
+  SE3 T_body_camera;              ///< body as in the file
   double metres_per_unit = 1e-3;  ///< `depth_unit_m`; millimetres by default
 };
 
-/// Refuses a lens with distortion: depth along the axis of a bent image has no common reading.
+/// Refuses a lens with distortion: depth along the axis is ambiguous in a distorted image.
 DepthSensor readDepthSensor(const NamedText& file, std::vector<std::string>& warnings);
 
 }  // namespace swiftlet

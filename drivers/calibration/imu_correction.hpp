@@ -1,9 +1,9 @@
 #pragma once
-// What takes an IMU's readings to rates and forces in body axes, and back.
+// Converts readings of an IMU to rates and forces in body axes, and back.
 //
 // Model (Kalibr's scale-misalignment; matrices map true to measured, in the sensor's own axes):
 //   accel = accel_matrix f + bias,   gyro = gyro_matrix omega + gyro_by_force f + bias.
-// Biases are the estimator's: after the correction they are other constants, which it finds as well.
+// Biases are not removed: the correction changes them to other constants, which the estimator finds as well.
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -32,11 +32,11 @@ struct ImuCorrection {
     sample.gyro = gyroOf(sample.gyro, sample.accel);
     sample.accel = accelOf(sample.accel);
   }
-  /// Followed by a rotation of both.
+  /// This correction followed by the rotation R of both sensors.
   [[nodiscard]] ImuCorrection turned(const Eigen::Matrix3d& R) const {
     return {R * gyro, R * gyro_by_accel, R * accel};
   }
-  /// What gives the readings back.
+  /// The inverse: from corrected values to readings.
   [[nodiscard]] ImuCorrection inverse() const {
     ImuCorrection back;
     back.gyro = gyro.inverse();

@@ -10,10 +10,10 @@
 namespace swiftlet {
 namespace {
 
-// Two statements of one transform in one file; Kalibr writes 16 digits.
+// Largest difference between two statements of one transform in one file; Kalibr writes 16 digits.
 constexpr double kContradiction = 1e-6;
-// Of an entry, from the identity: MEMS sensors are below 0.05; a matrix read the wrong way or with turned
-// axes is far above.
+// Largest deviation of an entry from the identity. MEMS sensors are below 0.05; a transposed matrix or
+// rotated axes are far above.
 constexpr double kMostImuError = 0.2;
 constexpr double kRounding = 1e-12;
 
@@ -83,7 +83,7 @@ void chain(std::vector<ChainCamera>& cameras) {
   }
 }
 
-/// `bare`: a chain without an IMU is one of camera 0.
+/// `bare`: a chain without an IMU takes camera 0 as the body.
 std::vector<CameraEntry> readChain(const YamlField& root, bool bare, Warnings& warnings) {
   std::vector<ChainCamera> cameras;
   for (int i = 0; root.has(fmt::format("cam{}", i)); ++i) {
@@ -155,7 +155,7 @@ void readImuModel(const YamlField& imu, Calibration& calibration) {
     if (gyro.has("M")) refuse(gyro.at("M"), calibration.gyro_matrix);
     if (gyro.has("A")) calibration.gyro_by_force = matrixOf(gyro.at("A"));
   }
-  // OpenVINS has the same under other names.
+  // OpenVINS uses other names for the same matrices.
   if (imu.has("Ta") || imu.has("R_IMUtoACC")) {
     calibration.accel_matrix = at(imu, "Ta") * at(imu, "R_IMUtoACC");
     refuse(imu.at(imu.has("Ta") ? "Ta" : "R_IMUtoACC"), calibration.accel_matrix);
@@ -165,7 +165,7 @@ void readImuModel(const YamlField& imu, Calibration& calibration) {
     refuse(imu.at(imu.has("Tw") ? "Tw" : "R_IMUtoGYRO"), calibration.gyro_matrix);
   }
   if (imu.has("Tg")) calibration.gyro_by_force = matrixOf(imu.at("Tg"));
-  // A product of identities that is rounded is none.
+  // Rounded products of identities count as the identity.
   if (calibration.gyro_matrix.isIdentity(kRounding)) calibration.gyro_matrix.setIdentity();
   if (calibration.accel_matrix.isIdentity(kRounding)) calibration.accel_matrix.setIdentity();
   if (imu.has("T_i_b")) {
@@ -191,7 +191,7 @@ CameraChain readCameraChain(const std::string& file) {
   const YamlField first = root.at("cam0", "Give a Kalibr camchain file");
   cameras.has_imu = first.has("T_cam_imu") || first.has("T_imu_cam");
   CalibrationOptions options;
-  options.accept_unusual_rig = !cameras.has_imu;  // its body is no IMU's
+  options.accept_unusual_rig = !cameras.has_imu;  // without an IMU, the body is not the IMU's
   assembleRig(readChain(root, !cameras.has_imu, calibration.warnings), options, calibration);
   cameras.rig = calibration.rig;
   return cameras;

@@ -18,28 +18,29 @@ using Eigen::Vector3d;
 constexpr int kParameters = 8;
 using Parameters = Eigen::VectorXd;  // fx fy cx cy and four coefficients
 
-// Directions and rays in each: the residual is smooth, with some five turns from the centre to a corner, and
-// between two rays it rises by less than a tenth of its maximum.
+// Number of directions, and rays in each. The residual is smooth, with about five extrema from the centre to
+// a corner, and rises by less than a tenth of its maximum between two rays.
 constexpr int kBorderPoints = 120;
 constexpr int kRays = 48;
-constexpr double kThetaStep = 2e-3;  // rad; a fold is a property of the whole lens, not of a ray
-// Radius over angle, as a share of what it is at the axis: below it a lens is about to fold back, which is
-// the polynomial's doing and no lens', and noise of a pixel means ten times the usual angle.
+constexpr double kThetaStep = 2e-3;  // rad; a fold affects the whole lens, so no ray needs a finer step
+// Smallest derivative of the radius by the angle, as a share of that at the axis. Below it the lens is about
+// to fold back, which only polynomials do, and one pixel of noise means ten times the usual angle.
 constexpr double kLeastGrowth = 0.1;
 constexpr double kBorder = 0.5;  // px; the image ends at the edge of its outermost pixels
 constexpr int kBisections = 40;
 constexpr double kLeastCovered = 0.5;
 constexpr double kToldCovered = 0.995;
-// By which a ray, its pixel and the pixel's ray may differ in a lens that can be inverted there [px].
+// Largest difference between a ray's pixel and the reprojection of that pixel's ray where the lens is
+// invertible [px].
 constexpr double kInverseTolerance = 1e-3;
 constexpr int kMaxEvaluations = 200;
-// Stands for the distance of a ray that the target does not see, to make the optimizer turn back [px].
+// Residual of a ray that the target model does not see, so that the optimizer turns back [px].
 constexpr double kUnseen = 1e3;
 
 struct Ray {
   Vector3d direction;  ///< unit
   Vector2d pixel;
-  double weight = 0;  ///< [px^2] of the image
+  double weight = 0;  ///< [px^2] image area
 };
 
 struct Region {
@@ -47,7 +48,7 @@ struct Region {
   double covered = 0;
 };
 
-/// One direction from the optical axis outward.
+/// One direction outward from the optical axis.
 class Meridian {
  public:
   Meridian(const SourceLens& lens, const Vector2d& border_pixel) : lens_(lens) {
@@ -58,7 +59,7 @@ class Meridian {
   [[nodiscard]] Vector3d direction(double theta) const {
     return std::sin(theta) * along_ + Vector3d(0, 0, std::cos(theta));
   }
-  /// Pixel at an angle, and its distance from the principal point in focal lengths; false where there is
+  /// Pixel at an angle, and its distance from the principal point in focal lengths; false if the lens has
   /// none.
   bool at(double theta, Vector2d& pixel, double& radius) const {
     if (!lens_.project(direction(theta), pixel)) return false;
@@ -69,7 +70,7 @@ class Meridian {
     return pixel.x() >= -kBorder && pixel.y() >= -kBorder && pixel.x() <= lens_.width - 1 + kBorder &&
            pixel.y() <= lens_.height - 1 + kBorder;
   }
-  /// Largest angle at which the image is not left and the radius still grows well.
+  /// Largest angle within the image up to which the radius still grows fast enough.
   [[nodiscard]] double end(bool& folds) const {
     double theta = 0;
     double radius = 0;
@@ -99,7 +100,7 @@ class Meridian {
   Vector3d along_;
 };
 
-/// Points around the image's border, the four corners among them.
+/// Points around the image's border, including the four corners.
 std::vector<Vector2d> borderPoints(int width, int height) {
   const double right = width - 1 + kBorder;
   const double bottom = height - 1 + kBorder;
@@ -149,7 +150,7 @@ CameraModel modelOf(CameraKind kind, const SourceLens& source, const Parameters&
   return {kind, source.width, source.height, p.head<4>(), p.tail<4>()};
 }
 
-/// What the optimizer asks for: two residuals a ray.
+/// Cost function for the optimizer: two residuals per ray.
 struct Residuals {
   using Scalar = double;
   using InputType = Parameters;
@@ -177,7 +178,7 @@ struct Residuals {
   }
 };
 
-/// RMS and maximum over the region; infinite where the model does not see a ray both ways.
+/// RMS and maximum over the region; infinite if the model cannot project and unproject every ray.
 void measure(const Region& region, LensFit& fit) {
   fit.rms = fit.max = std::numeric_limits<double>::infinity();
   double max = 0;
@@ -230,7 +231,7 @@ LensFit fitKind(CameraKind kind, const SourceLens& source, const Region& region)
   return fit;
 }
 
-/// Whether one of the estimator's models contains the source; then `fit` is it.
+/// Whether one of the estimator's models contains the source; if so, `fit` is that model.
 bool exactly(const SourceLens& source, LensFit& fit) {
   const bool brown = source.family == LensFamily::kBrown;
   if (!brown && source.family != LensFamily::kEquidistant) return false;

@@ -1,20 +1,20 @@
 #pragma once
-// Any lens of a calibration file as one of the estimator's two (estimator/camera/camera_model.hpp): the same
-// lens where one model contains the other, else the closest one.
+// Converts any lens of a calibration file to one of the estimator's two models
+// (estimator/camera/camera_model.hpp): exactly if one model contains the lens, else to the closest lens.
 //
-// Method: rays are followed from the optical axis to the image's border in directions all around. A direction
-// ends early where the source model folds back or has no value, so that the rays cover the image as far as
-// the source can be inverted. Both target models are fitted to the rays' pixels by least squares, each pixel
-// of the image with equal weight (Levenberg-Marquardt; More, "The Levenberg-Marquardt algorithm:
-// implementation and theory", 1978). A fit counts only where the target can be inverted at every ray; the one
-// with the smaller RMS is taken.
+// Method: rays are followed from the optical axis to the image's border in all directions. A direction ends
+// early where the source model folds back or has no value, so the rays cover the part of the image where the
+// source can be inverted. Both target models are fitted to the rays' pixels by least squares, with equal
+// weight for each pixel of the image (Levenberg-Marquardt; More, "The Levenberg-Marquardt algorithm:
+// implementation and theory", 1978). A fit is valid only if the target can be inverted at every ray; the one
+// with the smaller RMS is used.
 //
-// The RMS decides whether a fit is refused, not the maximum. The maximum lies in the outermost corners:
-// boards hardly reach them, so the source is a guess there itself (two good calibrations of EuRoC's cameras
-// differ by 0.4 to 0.6 px in the median and by 40 px in the corners), and few features are there. The maximum
-// is shown.
+// The RMS, not the maximum, decides whether a fit is refused. The maximum lies in the outermost corners:
+// calibration boards hardly reach them, so the source itself is uncertain there (two good calibrations of
+// EuRoC's cameras differ by 0.4 to 0.6 px in the median and by 40 px in the corners), and few features are
+// there. The maximum is reported.
 //
-// Errors: InputError. Host side only: allocates, takes some tens of ms a lens.
+// Errors: InputError. Host side only: allocates, takes some tens of ms per lens.
 
 #include <string>
 
@@ -24,12 +24,12 @@
 
 namespace swiftlet {
 
-/// A feature is tracked to 0.5 to 1 px; a lens that is off by less than half of it hardly shows in a flight.
+/// Features are tracked to 0.5 to 1 px; a lens error below half of that has hardly any effect in flight.
 inline constexpr double kMaxLensRms = 0.3;  // px over the covered region
 
 struct LensFit {
   CameraModel model;
-  bool exact = false;  ///< the target model contains the source: no residual but rounding
+  bool exact = false;  ///< the target model contains the source: only rounding errors
   double rms = 0;      ///< [px] over the covered region
   double max = 0;      ///< [px] over the covered region
   double covered = 1;  ///< share of the image in which the source can be inverted
@@ -37,11 +37,12 @@ struct LensFit {
   std::string words;
 };
 
-/// The closest lens of the estimator's, however far it is. `place`: the lens in its file. InputError when the
-/// source has no inverse in most of the image.
+/// The closest lens of the estimator's models, whatever its error. `place`: the lens in its file. InputError
+/// if the source has no inverse in most of the image.
 [[nodiscard]] LensFit fitLens(const SourceLens& source, const InputPlace& place);
 
-/// The same, refused above kMaxLensRms; warns where the source covers a part of the image alone.
+/// Like fitLens(), but refuses an RMS above kMaxLensRms and warns if the source covers only a part of the
+/// image.
 [[nodiscard]] LensFit convertLens(const SourceLens& source, const InputPlace& place, Warnings& warnings);
 
 }  // namespace swiftlet

@@ -1,4 +1,4 @@
-// OpenCV's FileStorage in YAML, as its samples of camera and stereo calibration write it.
+// OpenCV's FileStorage in YAML, as written by its sample programs for camera and stereo calibration.
 
 #include <algorithm>
 #include <array>
@@ -10,14 +10,14 @@ namespace {
 
 using RowMatrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-// OpenCV has no fixed names: those of its samples, and those that people write by hand.
+// OpenCV has no fixed names: these are those of its samples and common hand-written ones.
 constexpr std::array<const char*, 4> kMatrix = {"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"};
 constexpr std::array<const char*, 4> kDistortion = {"distortion_coefficients", "Distortion_Coefficients",
                                                     "distCoeffs", "D"};
 constexpr std::array<const char*, 3> kPairMatrix = {"M", "K", "cameraMatrix"};
 constexpr std::array<const char*, 3> kPairDistortion = {"D", "D", "distCoeffs"};
 
-/// A value under one of several names, in any of the files.
+/// The first value under one of several names, searched in all files.
 template <typename Names>
 std::optional<YamlField> find(const std::vector<YamlField>& files, const Names& names,
                               const std::string& suffix) {

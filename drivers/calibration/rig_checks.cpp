@@ -1,5 +1,5 @@
-// Checks that need the whole rig: a transform read the wrong way round shows in where the second
-// camera sits seen from the first.
+// Checks that need the whole rig: an inverted transform shows in the second camera's pose relative to the
+// first.
 
 #include <fmt/format.h>
 
@@ -16,7 +16,7 @@ constexpr double kMaxShiftDifference_s = 0.5e-3;
 constexpr double kMaxReadoutDifference_s = 0.1e-3;  // at 5 rad/s and 450 px, 0.1 px
 constexpr double kMaxAxisAngle = 30.0 * std::numbers::pi / 180.0;
 constexpr double kMinBaseline = 1e-3;  // m
-constexpr double kMaxBaseline = 1;     // m; wider than a drone, and centimetres read as metres have some 7
+constexpr double kMaxBaseline = 1;     // m; wider than a drone; centimetres read as metres give about 7
 
 bool xIsLargest(const Eigen::Vector3d& t) {
   return std::abs(t.x()) > std::abs(t.y()) && std::abs(t.x()) > std::abs(t.z());
@@ -77,7 +77,8 @@ void joinShifts(const std::vector<CameraEntry>& cameras, Calibration& calibratio
   }
 }
 
-// Rows of both cameras that are read at one time see the same part of a scene: with one readout for both.
+// Refuses different readouts: rows of both cameras must be read at the same time to see the same part of a
+// scene.
 void joinReadouts(const std::vector<CameraEntry>& cameras, Rig& rig) {
   rig.readout = Duration::fromSeconds(cameras[0].readout_s);
   if (rig.camera_count < 2) return;

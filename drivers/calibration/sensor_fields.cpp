@@ -13,20 +13,20 @@
 namespace swiftlet {
 namespace {
 
-// Single-precision copies of a rotation are off by some 1e-7; rounding to 4 digits by 1e-4.
+// Errors of rotations: about 1e-7 in single precision, 1e-4 when rounded to 4 digits.
 constexpr double kOrthonormalWarn = 1e-6;
 constexpr double kOrthonormalRefuse = 1e-3;
-// A skew bends a right angle of the image by skew / fx; calibration tools give exactly zero [px].
+// A skew changes the right angle between image axes by skew / fx; calibration tools give exactly zero [px].
 constexpr double kMaxSkew = 1e-6;
 constexpr double kLastRowTolerance = 1e-9;
 constexpr double kMaxLever = 10;   // m; a rig is smaller, so more means millimetres
-constexpr double kUsualLever = 1;  // m; OAK's centimetres have some 7
+constexpr double kUsualLever = 1;  // m; OAK files in centimetres give about 7
 constexpr const char* kMetres =
     "Translations are in metres: is this in millimetres, centimetres (OAK) or board squares (OpenCV)?";
 constexpr double kShiftWarn_s = 0.1;
 constexpr double kShiftRefuse_s = 1.0;
 constexpr double kReadoutRefuse_s = 0.2;  // the slowest phone takes 61 ms
-// Image side over focal length: fisheyes of 220 degrees have 4, a telescope 0.05.
+// Image side over focal length: 4 for fisheyes of 220 degrees, 0.05 for a telescope.
 constexpr double kWidestView = 12;
 constexpr double kNarrowestView = 0.02;
 constexpr int kMinImageSide = 16;
@@ -58,7 +58,7 @@ void checkCorners(const InputPlace& place, const CameraModel& model, Warnings& w
       if (!model.unproject({x, y}, bearing)) ++lost;
     }
   }
-  // A fisheye's corners are dark; a pinhole's are used.
+  // Only for pinholes: the corners of a fisheye image are dark.
   if (lost > 0 && model.kind() == CameraKind::kPinholeRadtan) {
     warnings.push_back(place.where() +
                        fmt::format(": the lens model has no inverse in {} of the 4 image corners (it folds "
@@ -236,7 +236,7 @@ LensFit readLens(const YamlField& camera, const std::string& coefficients_key, W
   const YamlField model_field =
       camera.at("camera_model", "swiftlet reads `pinhole`, `omni`, `ds` and `eucm`");
   const std::string model = model_field.text();
-  std::size_t shape = 0;  // parameters in front of fu
+  std::size_t shape = 0;  // parameters before fu
   if (model == "omni") {
     lens.family = LensFamily::kOmni;
     shape = 1;
@@ -280,7 +280,7 @@ LensFit readLens(const YamlField& camera, const std::string& coefficients_key, W
       setBrown(field.place(), values, lens);
       lens.family = family;
     } else {
-      // Devernay's angle of view; half of it has a tangent.
+      // Devernay's w is an angle of view, and the model needs tan(w / 2).
       if (values.size() != 1 || !(values[0] > 0 && values[0] < std::numbers::pi)) {
         throw field.error("not one angle between 0 and pi", "Give w [rad]");
       }

@@ -9,7 +9,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// OpenCV's 14 coefficients on the plane z = 1. False at a zero denominator.
+/// OpenCV's 14 coefficients applied to a point of the plane z = 1. False if a denominator is zero.
 bool brown(const std::array<double, 14>& k, Vector2d& point) {
   const auto [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = k;
   const double x = point.x();
@@ -21,7 +21,7 @@ bool brown(const std::array<double, 14>& k, Vector2d& point) {
   point.x() = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + r2 * s2);
   point.y() = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + r2 * s4);
   if (tau_x == 0 && tau_y == 0) return true;
-  // The sensor's plane is turned, and the image is what falls on it from the centre.
+  // The sensor plane is tilted: project the point onto it through the centre.
   const Eigen::Matrix3d R = (Eigen::AngleAxisd(-tau_y, Vector3d::UnitY()).toRotationMatrix() *
                              Eigen::AngleAxisd(-tau_x, Vector3d::UnitX()).toRotationMatrix());
   const Vector3d turned = R * point.homogeneous();

@@ -6,13 +6,13 @@
 namespace swiftlet {
 namespace {
 
-// A calibration file has a few kilobytes; a megabyte is something else, and the parser is recursive.
+// Calibration files have a few kilobytes. A megabyte is something else, and the parser is recursive.
 constexpr std::size_t kMaxYamlBytes = 1U << 20U;
 constexpr int kMaxNesting = 64;
 
 int lineOf(const YAML::Mark& mark) { return mark.is_null() ? 0 : mark.line + 1; }
 
-/// OpenCV writes "%YAML:1.0", which YAML 1.2 does not know: blanked to a comment.
+/// Turns OpenCV's "%YAML:1.0", which YAML 1.2 does not allow, into a comment.
 std::string withoutOpenCvHeader(std::string_view text) {
   std::string copy(text);
   if (copy.starts_with("\xEF\xBB\xBF")) copy.erase(0, 3);
@@ -61,7 +61,7 @@ bool YamlField::has(const std::string& key) const { return node_.IsMap() && node
 YamlField YamlField::at(const std::string& key, const std::string& remedy) const {
   const std::string name = name_.empty() ? key : name_ + "." + key;
   if (!has(key)) throw InputError(*file_, line(), name, "missing", remedy);
-  // A block value begins below its key; the key's line is where a user looks.
+  // A block value begins below its key; report the key's line, where users look.
   int key_line = line();
   for (const auto& pair : node_) {
     if (pair.first.IsScalar() && pair.first.Scalar() == key) key_line = lineOf(pair.first.Mark());

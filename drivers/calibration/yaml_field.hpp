@@ -1,7 +1,6 @@
 #pragma once
-// One value of a YAML file together with where it stands, so that every complaint names file, line
-// and field. For the readers of drivers/calibration and drivers/target, and of the lists of logs of a
-// campaign.
+// One value of a YAML file with its location, so that every message names file, line and field. Used by the
+// readers of drivers/calibration and drivers/target, and of a campaign's lists of logs.
 
 #include <yaml-cpp/yaml.h>
 
@@ -26,7 +25,7 @@ class YamlField {
   /// The value under `key`; InputError when absent.
   [[nodiscard]] YamlField at(const std::string& key, const std::string& remedy = {}) const;
   [[nodiscard]] std::vector<YamlField> items() const;
-  /// Of a map; empty otherwise.
+  /// Keys of a map; empty for other values.
   [[nodiscard]] std::vector<std::string> keys() const;
 
   [[nodiscard]] std::string text() const;
@@ -49,7 +48,7 @@ class YamlField {
   std::shared_ptr<const std::string> file_;
   std::string name_;  ///< dotted path from the root
   YAML::Node node_;
-  int line_ = 0;  ///< of the key, or of the list's item
+  int line_ = 0;  ///< of the key or the list item
 };
 
 }  // namespace swiftlet
