@@ -18,14 +18,14 @@ namespace swiftlet {
 namespace {
 
 constexpr int kErrorFramesPerCall = 16;
-// A stamp older than this at its reading, or later than it, was taken before the wall clock was stepped.
+// A stamp further from its reading time than this was taken before the wall clock was stepped.
 constexpr Duration kOldest = Duration::fromMilliseconds(10'000);
 constexpr can_err_mask_t kErrors =
     CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL | CAN_ERR_TX_TIMEOUT | CAN_ERR_ACK;
 
 Stamp stampOf(const timespec& time) { return {time.tv_sec * 1'000'000'000 + time.tv_nsec}; }
 
-/// What came beside a frame.
+/// Ancillary data of a frame.
 struct Beside {
   std::optional<Stamp> software;  ///< CLOCK_REALTIME
   std::optional<std::uint32_t> lost;
@@ -36,7 +36,7 @@ Beside readControl(msghdr& message) {
   for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr; part = CMSG_NXTHDR(&message, part)) {
     if (part->cmsg_level != SOL_SOCKET) continue;
     if (part->cmsg_type == SCM_TIMESTAMPING) {
-      // Software, deprecated, raw hardware.
+      // Order: software, deprecated, raw hardware.
       std::array<timespec, 3> stamps = {};
       std::memcpy(stamps.data(), CMSG_DATA(part), sizeof(stamps));
       if (stampOf(stamps[0]).ns != 0) beside.software = stampOf(stamps[0]);
@@ -60,7 +60,7 @@ CanFrame frameOf(const canfd_frame& raw, bool fd) {
   return frame;
 }
 
-/// An interface's name in a request; false where it does not fit.
+/// Copies the interface's name into a request; false if the name is empty.
 bool nameOf(const CanBusSettings& settings, ifreq& request) {
   std::snprintf(request.ifr_name, sizeof(request.ifr_name), "%s", settings.interface.data());
   return request.ifr_name[0] != '\0';
@@ -160,7 +160,8 @@ DeviceFault CanBus::setUp() {
   if (takes_fd_) ok = ok && set(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof(on));
   if (!ok) return deviceFault(DeviceFaultKind::kFailed, errno, "setting up the socket");
 
-  // Beyond net.core.rmem_max where the right is there; the kernel doubles and answers with the doubled.
+  // With the required capability the size can exceed net.core.rmem_max. The kernel doubles the value and
+  // reports the doubled one.
   if (!set(SOL_SOCKET, SO_RCVBUFFORCE, &settings_.receive_buffer, sizeof(int))) {
     set(SOL_SOCKET, SO_RCVBUF, &settings_.receive_buffer, sizeof(int));
   }
@@ -281,7 +282,7 @@ DeviceFault CanBus::send(const CanFrame& frame) {
                        frame.size);
   }
   std::copy_n(frame.data.begin(), frame.size, raw.data);
-  // Both kinds begin alike; the length tells them apart.
+  // struct can_frame and canfd_frame begin alike; the kernel tells them apart by length.
   if (::write(fd_, &raw, frame.fd ? CANFD_MTU : CAN_MTU) >= 0) {
     ++counters_.sent;
     return {};

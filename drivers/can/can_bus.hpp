@@ -1,16 +1,14 @@
 #pragma once
-// One CAN interface through a raw SocketCAN socket: frames with the kernel's receive stamps, and the bus's
-// troubles.
+// One CAN interface through a raw SocketCAN socket: frames with the kernel's receive stamps, and the state
+// and errors of the bus.
 //
-// Threads: one. Nothing waits: poll fd() for POLLIN, then call next() until it gives no frame.
-// Errors: values that name the command that helps. Down, and bus-off, pass by themselves: go on calling
-// next().
-//   After kUnplugged or kMissing the socket is closed; reopen() takes the interface up when it is there
-//   again.
-// Stamps: the kernel's software stamp is CLOCK_REALTIME; the offset to CLOCK_MONOTONIC is measured at each
-//   receipt, so that a step of the wall clock moves one frame at most, and the best measurement since the
-//   last step is used.
-// Memory: the socket's buffer in the kernel; no allocation. Cost of a frame: one call and three clock
+// Threads: one. Nothing blocks: poll fd() for POLLIN, then call next() until it gives no frame.
+// Errors: values that name the remedy. kDown (interface down or bus off) ends by itself: keep calling next().
+//   After kUnplugged or kMissing the socket is closed; reopen() opens the interface again once it exists.
+// Stamps: the kernel's software stamp is in CLOCK_REALTIME. The offset to CLOCK_MONOTONIC is measured at each
+//   receipt, so a step of the wall clock affects one frame at most. The best measurement since the last step
+//   is used.
+// Memory: the socket's buffer in the kernel; no allocation. Cost per frame: one system call and three clock
 // readings. Source: the kernel's Documentation/networking/can.rst and timestamping.rst; linux/can/error.h.
 
 #include <array>
@@ -24,7 +22,7 @@
 
 namespace swiftlet {
 
-/// Takes extended frames with (id & mask) == (this id & mask).
+/// Accepts extended frames with (id & mask) == (this id & mask).
 struct CanFilter {
   std::uint32_t id = 0;
   std::uint32_t mask = 0;
@@ -32,10 +30,10 @@ struct CanFilter {
 
 struct CanBusSettings {
   std::array<char, 16> interface = {};  ///< "can0"
-  bool fd = false;  ///< true: refused where the interface is set up for classic frames only
+  bool fd = false;  ///< true: also FD frames; refused if the interface is set up for classic frames only
   std::array<CanFilter, 4> filters = {};
   std::size_t filter_count = 0;  ///< 0: every frame
-  /// Each frame is charged several hundred bytes; 4 MiB hold a second and more of a full bus.
+  /// [bytes] Each frame is charged several hundred bytes; 4 MiB hold more than a second of a full bus.
   int receive_buffer = 4 << 20;
 
   void setInterface(const char* name);
@@ -44,16 +42,17 @@ struct CanBusSettings {
 
 struct CanBusCounters {
   std::uint64_t frames = 0;
-  std::uint64_t fd_frames = 0;  ///< of those
+  std::uint64_t fd_frames = 0;  ///< FD frames among them
   std::uint64_t sent = 0;
-  std::uint64_t lost_in_socket = 0;  ///< by the kernel, because the socket was full
+  std::uint64_t lost_in_socket = 0;  ///< dropped by the kernel because the socket buffer was full
   std::uint64_t error_frames = 0;
   std::uint64_t bus_off = 0;
-  std::uint64_t restarts = 0;  ///< of the controller after bus-off
+  std::uint64_t restarts = 0;  ///< of the controller, after bus-off
   std::uint64_t controller_overflows = 0;
   std::uint64_t error_passive = 0;
   std::uint64_t went_down = 0;
-  std::uint64_t without_stamp = 0;  ///< arrival is the time of the reading
+  std::uint64_t without_stamp = 0;  ///< frames without a usable kernel stamp; their arrival is the time of
+                                    ///< reading
   std::uint64_t reopened = 0;
 };
 
@@ -70,17 +69,17 @@ class CanBus {
   [[nodiscard]] bool isOpen() const { return fd_ >= 0; }
   [[nodiscard]] int fd() const { return fd_; }
 
-  /// The oldest frame that waits; empty: none. kDown with no frame as long as the interface is down or the
-  /// bus off. Error frames are taken in on the way, 16 at most in one call.
+  /// The oldest waiting frame; empty: none. Returns kDown, without a frame, while the interface is down or
+  /// the bus is off. Handles up to 16 error frames per call.
   DeviceFault next(std::optional<CanFrame>& frame);
-  /// kBusy: the queue of the interface is full, try again.
+  /// kBusy: the interface's transmit queue is full; try again.
   DeviceFault send(const CanFrame& frame);
 
   [[nodiscard]] const CanBusCounters& counters() const { return counters_; }
   /// Maximum error of the newest frame's arrival, converted from the kernel's stamp.
   [[nodiscard]] Duration stampError() const { return clocks_ ? clocks_->error : Duration{}; }
-  /// kChanged if the receive buffer is less than a quarter of the requested one, as net.core.rmem_max is
-  /// lower; the text says how to raise it.
+  /// kChanged if the receive buffer is less than a quarter of the requested size because net.core.rmem_max is
+  /// too low; the text says how to raise it.
   [[nodiscard]] const DeviceFault& warning() const { return warning_; }
 
  private:

@@ -13,20 +13,20 @@ struct CanFrame {
   static constexpr std::size_t kClassicBytes = 8;
   static constexpr std::size_t kMaxBytes = 64;
 
-  std::uint32_t id = 0;  ///< 29 bits, or 11 where not extended
+  std::uint32_t id = 0;  ///< 29 bits if extended, else 11
   bool extended = true;
   bool fd = false;
-  bool fast_data = false;  ///< FD only: the data at the higher bit rate
+  bool fast_data = false;  ///< FD only: data is sent at the higher bit rate
   std::uint8_t size = 0;
   std::array<std::uint8_t, kMaxBytes> data = {};
 
-  /// CLOCK_MONOTONIC: when the kernel had it.
+  /// CLOCK_MONOTONIC: when the kernel received the frame.
   Stamp arrival;
 
   [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {data.data(), size}; }
 };
 
-/// The smallest number of bytes that an FD frame can carry and that `size` (at most 64) fits into.
+/// The smallest FD frame length that holds `size` bytes (`size` at most 64).
 [[nodiscard]] constexpr std::size_t fdFrameSize(std::size_t size) {
   constexpr std::array<std::size_t, 8> kSizes = {8, 12, 16, 20, 24, 32, 48, 64};
   if (size <= kSizes.front()) return size;

@@ -14,7 +14,7 @@ constexpr std::uint8_t kToggle = 0x20;
 constexpr std::uint8_t kIdMask = 0x1f;
 constexpr std::uint32_t kIds = 32;
 constexpr std::size_t kChecksumBytes = 2;
-constexpr Duration kTimeout = Duration::fromMilliseconds(2000);  // the specification's
+constexpr Duration kTimeout = Duration::fromMilliseconds(2000);  // from the specification
 
 }  // namespace
 
@@ -29,7 +29,7 @@ DroneCanId dronecanId(std::uint32_t can_id) {
   id.priority = static_cast<std::uint8_t>(can_id >> 24U & 0x1fU);
   id.service = (can_id & 0x80U) != 0;
   id.node = static_cast<std::uint8_t>(can_id & 0x7fU);
-  // An anonymous message keeps 14 of its bits for a discriminator, a service's type has 8.
+  // An anonymous message uses 14 bits of the type for a discriminator; a service's type has 8 bits.
   const std::uint32_t type = can_id >> 8U;
   id.type =
       static_cast<std::uint16_t>(id.service ? type >> 8U & 0xffU : type & (id.node == 0 ? 0x3U : 0xffffU));
@@ -49,7 +49,7 @@ bool DroneCanReassembler::take(const CanFrame& frame, DroneCanTransfer& transfer
   if (node.heard && frame.arrival - node.latest > kTimeout) {
     counters_.timeouts += node.collecting ? 1 : 0;
     node.collecting = false;
-    // The ids may have gone round many times.
+    // Transfer ids may have wrapped around several times.
     node.heard = false;
   }
   const bool complete = (tail & kStart) != 0 ? begin(node, frame, tail) : follow(node, frame, tail);
@@ -72,7 +72,8 @@ void DroneCanReassembler::countLost(const Node& node, std::uint8_t transfer_id) 
 bool DroneCanReassembler::begin(Node& node, const CanFrame& frame, std::uint8_t tail) {
   const std::size_t size = frame.size - 1U;
   const bool whole = (tail & kEnd) != 0;
-  // The same id and the same bytes: the bus sent a frame twice. An id alone comes again after 32 transfers.
+  // Same id and same bytes: the bus repeated a frame. The id alone is not enough, as it recurs after 32
+  // transfers.
   const bool same = node.fd == frame.fd && node.tail == tail && node.last_size == size &&
                     std::memcmp(node.bytes.data(), frame.data.data(), size) == 0;
   if (same && (whole ? node.completed && node.size == size : node.collecting && node.size == size)) {
@@ -102,7 +103,7 @@ bool DroneCanReassembler::begin(Node& node, const CanFrame& frame, std::uint8_t 
 bool DroneCanReassembler::follow(Node& node, const CanFrame& frame, std::uint8_t tail) {
   const std::size_t size = frame.size - 1U;
   if (!node.collecting) {
-    // The last frame of a transfer, sent twice, comes here too.
+    // A repeated last frame of a complete transfer ends up here too.
     const bool again = node.completed && tail == node.tail && size == node.last_size &&
                        std::memcmp(node.bytes.data() + node.size - size, frame.data.data(), size) == 0;
     ++(again ? counters_.repeated : counters_.strays);
@@ -146,7 +147,7 @@ bool encodeTransfer(const DroneCanType& type, std::uint8_t priority, std::uint8_
   const bool several = payload.size() > room;
   std::array<std::uint8_t, DroneCanReassembler::kMaxBytes> bytes = {};
   std::size_t size = payload.size() + (several ? kChecksumBytes : 0);
-  // An FD frame has only certain lengths; what is filled up counts as payload.
+  // FD frames have only certain lengths; padding counts as payload.
   const std::size_t last = size % room;
   const std::size_t padding = fd && last != 0 ? fdFrameSize(last + 1) - last - 1 : 0;
   if (size + padding > bytes.size()) return false;

@@ -5,7 +5,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::uint32_t kExponentStep = 127 - 15;  // between the two exponents' zeros
+constexpr std::uint32_t kExponentStep = 127 - 15;  // difference of the two exponent biases
 constexpr std::uint32_t kInfinity32 = 0x7f800000U;
 
 }  // namespace
@@ -30,7 +30,7 @@ std::uint16_t toHalf(float value) {
   const float positive = std::bit_cast<float>(magnitude);
   if (positive >= 65520.0F) return static_cast<std::uint16_t>(sign | 0x7c00U);
   if (positive < 0x1p-14F) {
-    // Adding 1/2 ulp of the result's grid lets the addition itself round: 2^-24 is the last place of 0.5.
+    // Adding 0.5 rounds to a multiple of 2^-24, because that is the last place of floats near 0.5.
     const float shifted = positive + 0.5F;
     return static_cast<std::uint16_t>(
         sign | (std::bit_cast<std::uint32_t>(shifted) - std::bit_cast<std::uint32_t>(0.5F)));

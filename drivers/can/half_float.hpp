@@ -1,13 +1,13 @@
 #pragma once
-// IEEE 754 binary16, in which DroneCAN sends small numbers.
+// IEEE 754 binary16, used by DroneCAN for small numbers.
 
 #include <cstdint>
 
 namespace swiftlet {
 
-/// Exact.
+/// Exact conversion.
 [[nodiscard]] float fromHalf(std::uint16_t half);
-/// To the nearest, ties to even; beyond 65504 infinity.
+/// Rounds to nearest, ties to even; values above 65504 become infinity.
 [[nodiscard]] std::uint16_t toHalf(float value);
 
 }  // namespace swiftlet

@@ -17,11 +17,11 @@ constexpr std::size_t kFixedBytes = 47;
 constexpr std::size_t kMaxTerms = 36;
 constexpr unsigned kCountBits = 6;
 constexpr unsigned kTransferIds = 32;
-// Longer means would smear motion; a node that says so is not to be believed.
+// Means over a longer interval would smear motion; a longer value is not plausible.
 constexpr float kLongestInterval = 1.0F;  // s
 constexpr std::uint64_t kLargestStampUs =
     static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()) / 1000;
-// Type and source of a broadcast; the priority is free.
+// Type and service bit of a broadcast id; the priority may be anything.
 constexpr std::uint32_t kTypeMask = 0x00ffff80;
 
 class Reader {
@@ -92,7 +92,7 @@ bool decodeRawImu(std::span<const std::uint8_t> payload, bool fd, RawImu& out) {
     std::uint32_t low = rest[at];
     std::uint32_t high = rest[at + 1];
     if (fd) {
-      // Two bits of a byte, six of the next.
+      // The count's 6 bits shift all values: 2 bits come from one byte and 6 from the next.
       low = (low << kCountBits | high >> (8 - kCountBits)) & 0xffU;
       high = (high << kCountBits | static_cast<std::uint32_t>(rest[at + 2] >> (8 - kCountBits))) & 0xffU;
     }
