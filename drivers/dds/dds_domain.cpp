@@ -12,9 +12,9 @@
 namespace swiftlet {
 namespace {
 
-/// Beyond this many unacknowledged bytes the library would hold a writer back: more than it can ever keep.
+/// The library throttles a writer above this many unacknowledged bytes: set to more than it can ever keep.
 constexpr const char* kWatermark = "1 GB";
-/// Of the kernel, for what comes: 25 images of 640x480. It grants net.core.rmem_max at most.
+/// The kernel's receive buffer: 25 images of 640x480. The kernel grants at most net.core.rmem_max.
 constexpr const char* kReceiveBuffer = "10 MB";
 
 std::string configuration(const DdsNetwork& network) {
@@ -25,7 +25,7 @@ std::string configuration(const DdsNetwork& network) {
                      std::to_string(kLargestMessage) +
                      " B</MaxSampleSize><SocketReceiveBufferSize min=\"default\" max=\"" + kReceiveBuffer +
                      "\"/><Watermarks><WhcHigh>" + kWatermark + "</WhcHigh></Watermarks></Internal>";
-  // Without multicast nobody hears a program that starts later: it has to hear us.
+  // Without multicast, programs that start later are found only by unicast discovery on this computer.
   if (loopback) {
     text +=
         "<Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32"
@@ -35,7 +35,7 @@ std::string configuration(const DdsNetwork& network) {
   return text;
 }
 
-/// Of all domains: the library has one place for what it says.
+/// Shared by all domains: the library has one log sink.
 struct Complaints {
   std::atomic<std::uint64_t> lines{0};
   std::atomic<void (*)(std::string_view)> tell{nullptr};
@@ -45,7 +45,7 @@ Complaints& allComplaints() {
   return all;
 }
 
-/// The first few lines are told: a flood of messages that are too large gives one each.
+/// Passes on only the first few lines: every message that is too large produces one.
 void complain(void* to, const dds_log_data_t* data) {
   constexpr std::uint64_t kTold = 8;
   auto& all = *static_cast<Complaints*>(to);
@@ -53,7 +53,7 @@ void complain(void* to, const dds_log_data_t* data) {
   if (auto* const tell = all.tell.load(std::memory_order_relaxed)) tell(data->message);
 }
 
-/// Names of the network interfaces, with commas; `wanted` is set if it is one of them.
+/// Comma-separated names of the network interfaces; sets `found` if `wanted` is one of them.
 std::string interfaces(const std::string& wanted, bool& found) {
   std::string names;
   found = false;
@@ -66,7 +66,7 @@ std::string interfaces(const std::string& wanted, bool& found) {
   return names;
 }
 
-/// The domains that are open, by number: the library opens each once a process.
+/// The open domains by number: the library opens each once per process.
 struct OpenDomains {
   std::mutex mutex;
   std::map<std::uint32_t, std::weak_ptr<DdsDomain>> all;
@@ -76,12 +76,12 @@ OpenDomains& openDomains() {
   return open;
 }
 
-/// "rt/camera/imu" as ROS names it; empty: no topic of ROS.
+/// DDS to ROS topic name ("/camera/imu" for "rt/camera/imu"); empty if it is not a ROS topic.
 std::string rosTopic(std::string_view name) {
   return name.starts_with("rt/") ? std::string(name.substr(2)) : std::string();
 }
 
-/// "sensor_msgs::msg::dds_::Imu_" as ROS names it.
+/// DDS to ROS type name, of "sensor_msgs::msg::dds_::Imu_".
 std::string rosType(std::string_view type) {
   std::string text(type);
   if (const std::size_t at = text.find("dds_::"); at != std::string::npos) text.erase(at, 6);
@@ -147,7 +147,7 @@ std::vector<PublishedTopic> DdsDomain::publishedTopics() const {
   dds_guid_t own{};
   dds_get_guid(participant_, &own);
   constexpr std::size_t kAtOnce = 32;
-  constexpr int kMostRounds = 64;  // of a domain with more writers than anybody looks through
+  constexpr int kMostRounds = 64;  // bounds the time in domains with very many writers
   std::array<void*, kAtOnce> samples{};
   std::array<dds_sample_info_t, kAtOnce> infos{};
   for (int round = 0; round < kMostRounds; ++round) {

@@ -1,10 +1,10 @@
 #pragma once
-// A DDS domain that this program joins, shared by all its publishers and subscribers there.
+// A DDS domain that this program has joined, shared by all its publishers and subscribers in it.
 //
 // Network: loopback and unicast unless `interface` names another. Messages above kLargestMessage are neither
 // sent nor received. Threads: any. The library has its own threads, which inherit the scheduling of the
 // thread that first opened the domain. Errors: text for the user. In builds without SWIFTLET_WITH_DDS, open()
-// returns an error that says so.
+// always fails and says so.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,13 +19,13 @@ inline constexpr std::size_t kLargestMessage = std::size_t{16} * 1024 * 1024;
 
 struct DdsNetwork {
   std::uint32_t domain = 0;      ///< ROS_DOMAIN_ID, 0 to 232
-  std::string interface = "lo";  ///< network interface; "lo": this computer alone
-  /// Receives the first lines of the library's warnings and errors, from any of its threads; null: none.
-  /// Applies to the domain that was opened last: the library has one sink for all.
+  std::string interface = "lo";  ///< network interface; "lo": this computer only
+  /// Receives the first lines of the library's warnings and errors, from any of its threads; null: none. The
+  /// setting of the domain opened last applies to all, since the library has one sink.
   void (*complain)(std::string_view line) = nullptr;
 };
 
-/// A topic that somebody publishes, by ROS's names: "/camera/imu", "sensor_msgs/msg/Imu".
+/// A published topic by its ROS names: "/camera/imu", "sensor_msgs/msg/Imu".
 struct PublishedTopic {
   std::string name;
   std::string type;
@@ -42,9 +42,9 @@ class DdsDomain {
 
   /// The library's handle of our participant.
   [[nodiscard]] std::int32_t participant() const { return participant_; }
-  /// Of other programs, as far as they have been heard, by name.
+  /// Topics published by other programs, as discovered so far, sorted by name.
   [[nodiscard]] std::vector<PublishedTopic> publishedTopics() const;
-  /// Lines of the library so far; a message that is too large gives one.
+  /// Number of warnings and errors of the library so far; a message that is too large gives one.
   [[nodiscard]] static std::uint64_t complaints();
 
  private:

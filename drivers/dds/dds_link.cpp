@@ -14,8 +14,8 @@ using Odometry = nav_msgs_msg_dds__Odometry_;
 using Header = std_msgs_msg_dds__Header_;
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-constexpr int kKept = 16;       ///< diagnostics that a late or slow subscriber can still get
-constexpr int kKeptOut = 4;     ///< images likewise
+constexpr int kKept = 16;       ///< diagnostics kept for late or slow subscribers
+constexpr int kKeptOut = 4;     ///< images kept for them
 constexpr int kTriangles = 11;  ///< visualization_msgs/Marker::TRIANGLE_LIST
 constexpr int kAdd = 0;
 constexpr int kDelete = 2;
@@ -24,7 +24,7 @@ constexpr std::uint8_t kUint32 = 6;
 constexpr std::size_t kFieldBytes = 4;
 constexpr std::uint32_t kMaxSide = 16384;
 
-/// The message is read while it is written out and not kept: what C wants without const stays ours.
+/// C string for a message field. `keep` holds the text while the message is written; C requires non-const.
 char* text(std::string_view view, std::string& keep) {
   keep.assign(view);
   return keep.data();
@@ -56,7 +56,7 @@ void lend(Sequence& sequence, std::vector<Item>& items) {
   sequence._release = false;
 }
 
-/// What ROS 2 asks for: reliable, volatile, the last `kept`; and no waiting.
+/// Quality of service as in ROS 2: reliable or best effort, volatile, the last `kept`; writers never wait.
 dds_qos_t* quality(bool reliable, int kept) {
   dds_qos_t* qos = dds_create_qos();
   dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
@@ -67,7 +67,7 @@ dds_qos_t* quality(bool reliable, int kept) {
   return qos;
 }
 
-/// False: not 8 bits, or smaller than it says.
+/// False: the image does not have 8 bits, or has less data than declared.
 bool copyImage(const sensor_msgs_msg_dds__Image_& from, DdsImage& image) {
   const std::string_view encoding = from.encoding;
   const std::uint64_t needed = static_cast<std::uint64_t>(from.step) * from.height;
@@ -91,7 +91,7 @@ bool copyImage(const sensor_msgs_msg_dds__Image_& from, DdsImage& image) {
 
 struct DdsLink::Entities {
   std::shared_ptr<DdsDomain> domain;
-  std::vector<dds_entity_t> made;  ///< topics before what writes and reads them
+  std::vector<dds_entity_t> made;  ///< topics before their writers and readers
   dds_entity_t odometry = 0;
   dds_entity_t transforms = 0;
   dds_entity_t mesh = 0;
@@ -100,10 +100,10 @@ struct DdsLink::Entities {
   dds_entity_t diagnostics = 0;
   dds_entity_t labels = 0;
   dds_entity_t image = 0;
-  std::atomic<std::uint64_t> images_came{0};  ///< counted by the library's thread
+  std::atomic<std::uint64_t> images_came{0};  ///< counted by the library's threads
   std::uint64_t images_seen = 0;
 
-  // Room of the messages on their way out.
+  // Storage of outgoing messages.
   std::array<std::string, 2> texts;
   std::vector<geometry_msgs_msg_dds__TransformStamped_> transform_list;
   std::vector<std::string> names;
@@ -127,7 +127,7 @@ struct DdsLink::Entities {
     if (!bytes.empty()) std::memcpy(bytes.data(), from.data(), bytes.size());
   }
 
-  /// ROS's name of a topic begins with a slash, DDS's with rt.
+  /// ROS topic names begin with a slash, the DDS names with rt before it.
   [[nodiscard]] dds_entity_t topic(const dds_topic_descriptor_t& type, const std::string& name) {
     const dds_entity_t topic =
         dds_create_topic(domain->participant(), &type, ("rt" + name).c_str(), nullptr, nullptr);
@@ -142,7 +142,7 @@ struct DdsLink::Entities {
     return writer;
   }
   [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& name) {
-    // Best effort meets both kinds of writers, and asks no writer to wait for us.
+    // Best effort matches both kinds of writers, and no writer waits for this reader.
     dds_qos_t* qos = quality(false, kKeptImages);
     dds_listener_t* listener = dds_create_listener(&images_came);
     dds_lset_data_available(listener, [](dds_entity_t, void* came) {
@@ -266,7 +266,7 @@ bool DdsLink::publish(const DdsMesh& mesh) {
 
 bool DdsLink::publish(const DdsCloud& cloud) {
   if (!entities_) return false;
-  // `rgb` is a float's bits by custom: viewers look for it so.
+  // By convention `rgb` holds its bits as a float; viewers expect this.
   constexpr std::array<const char*, 5> kFields = {"x", "y", "z", "rgb", "label"};
   static_assert(sizeof(DdsCloudPoint) == kFields.size() * kFieldBytes);
   entities_->take(cloud.points);
@@ -275,7 +275,7 @@ bool DdsLink::publish(const DdsCloud& cloud) {
 
 bool DdsLink::publish(const DdsObstacle& obstacle) {
   if (!entities_) return false;
-  // Of a point with a normal, as PCL names them; then ours.
+  // Names as PCL uses them for a point with normal, followed by our own.
   constexpr std::array<const char*, 10> kFields = {"x",        "y",        "z",        "normal_x", "normal_y",
                                                    "normal_z", "distance", "known_to", "age",      "kind"};
   static_assert(sizeof(DdsObstacle::Point) == kFields.size() * kFieldBytes);

@@ -1,13 +1,13 @@
 #pragma once
-// Messages of ROS 2 to and from other processes, without ROS: topics `rt/...`, types `...::dds_::..._`, plain
+// Exchanges ROS 2 messages with other processes without ROS: topics `rt/...`, types `...::dds_::..._`, plain
 // CDR, over Eclipse Cyclone DDS. docs/ros2.md lists topics, types, frames and qualities of service.
 //
 // Nothing blocks: every writer keeps only its last messages and never waits (max_blocking_time 0), and the
-// library's throttle is out of reach, so a slow, stopped or killed subscriber loses only its own messages.
-// Messages that a writer rejects are counted. One thread calls publish and take. Memory: messages not yet
-// acknowledged by subscribers, at most the last kKeptStates odometries and transforms, 16 diagnostics, 4
-// images, 1 mesh, 1 surface, 1 obstacle; kKeptImages label images not yet taken; grows to the largest message
-// seen. No exceptions.
+// library's throttle limit is never reached, so a slow, stopped or killed subscriber loses only its own
+// messages. Messages that a writer rejects are counted. One thread calls publish and take. Memory: messages
+// not yet acknowledged by subscribers, at most the last kKeptStates odometries and transforms, 16
+// diagnostics, 4 images, 1 mesh, 1 surface, 1 obstacle; kKeptImages label images not yet taken; grows to the
+// largest message seen. No exceptions.
 
 #include <Eigen/Core>
 #include <array>
@@ -27,12 +27,12 @@
 
 namespace swiftlet {
 
-/// One second at 200 Hz: a reader that gets no CPU for less loses nothing.
+/// One second at 200 Hz: a subscriber that gets no CPU for less than that loses nothing.
 inline constexpr int kKeptStates = 200;
 inline constexpr int kKeptImages = 8;
 
 struct DdsSettings : DdsNetwork {
-  std::string prefix = "/swiftlet";  ///< of our topics; /tf and /diagnostics have none
+  std::string prefix = "/swiftlet";  ///< of our topics; not used for /tf and /diagnostics
   std::string label_topic;           ///< sensor_msgs/Image to read; empty: none, and no image is sent
 };
 
@@ -43,8 +43,8 @@ struct DdsOdometry {
   SE3 T_frame_child;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s, child axes
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s, child axes
-  std::array<double, 36> pose_covariance{};   ///< x y z, rotations about the frame's axes; rows
-  std::array<double, 36> twist_covariance{};  ///< child axes; rows
+  std::array<double, 36> pose_covariance{};   ///< x y z, rotations about the frame's axes; row by row
+  std::array<double, 36> twist_covariance{};  ///< child axes; row by row
 };
 
 struct DdsTransform {
@@ -54,7 +54,7 @@ struct DdsTransform {
   SE3 T_frame_child;
 };
 
-/// Three points and three colours (r g b, 0 to 1) a triangle; without points the marker is taken away.
+/// Three points and three colours (r g b, 0 to 1) per triangle. An empty mesh deletes the marker.
 struct DdsMesh {
   Stamp stamp;
   std::string_view frame;
@@ -76,14 +76,14 @@ struct DdsCloud {
 
 /// The nearest obstacle, as a cloud of one point.
 struct DdsObstacle {
-  /// In the order of the wire format.
+  /// Fields in the order of the wire format.
   struct Point {
     Eigen::Vector3f p = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());  ///< m; NaN: none
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< unit, away from the surface; zero without a point
     float distance = 0;                                ///< m
     float known_to = 0;                                ///< m
-    float age = 0;           ///< s, from the newest image that is in it to the stamp
-    std::uint32_t kind = 0;  ///< 0 in unknown space, 1 at least `distance`, 2 `distance`
+    float age = 0;           ///< s, from the newest image that contributed to the stamp
+    std::uint32_t kind = 0;  ///< 0: in unknown space, 1: at least `distance` away, 2: `distance` away
   };
   Stamp stamp;
   std::string_view frame;
@@ -97,14 +97,14 @@ struct DdsStatus {
   std::vector<std::pair<std::string, std::string>> values;
 };
 
-/// On its way out, as mono8.
+/// An outgoing mono8 image.
 struct DdsImageView {
   Stamp stamp;
   std::string_view frame;
   ImageView image;
 };
 
-/// An 8-bit image, rows without gaps.
+/// A received 8-bit image, rows without padding.
 struct DdsImage {
   Stamp stamp;
   std::string frame;
@@ -115,11 +115,12 @@ struct DdsImage {
 
 struct DdsCounters {
   std::uint64_t written = 0;
-  std::uint64_t refused = 0;         ///< by the library: it would have had to wait
-  std::uint64_t complaints = 0;      ///< lines of the library; a message that is too large gives one
-  std::uint64_t images = 0;          ///< taken
+  std::uint64_t refused = 0;     ///< refused by the library because it would have had to wait
+  std::uint64_t complaints = 0;  ///< warnings and errors of the library; a message that is too large gives
+                                 ///< one
+  std::uint64_t images = 0;      ///< images taken
   std::uint64_t images_refused = 0;  ///< not 8 bits, or smaller than declared
-  std::uint64_t images_skipped = 0;  ///< overrun by kKeptImages newer ones before they were read
+  std::uint64_t images_skipped = 0;  ///< overwritten by kKeptImages newer ones before they were taken
 };
 
 class DdsLink {
@@ -129,33 +130,33 @@ class DdsLink {
   DdsLink(const DdsLink&) = delete;
   DdsLink& operator=(const DdsLink&) = delete;
 
-  /// Once. False, with error() for the user, where the domain cannot be opened.
+  /// Call once. False, with error() for the user, if the domain cannot be opened.
   [[nodiscard]] bool open(const DdsSettings& settings);
   [[nodiscard]] const std::string& error() const { return error_; }
 
-  /// False: refused, counted.
+  /// False: the message was refused; counted.
   bool publish(const DdsOdometry& odometry);
   bool publish(std::span<const DdsTransform> transforms);
   bool publish(const DdsMesh& mesh);
   bool publish(const DdsCloud& cloud);
   bool publish(const DdsObstacle& obstacle);
   bool publish(Stamp stamp, std::span<const DdsStatus> statuses);
-  /// Camera 0's image for the labeller. Only if there is a label topic.
+  /// Sends camera 0's image to the labeller; only if there is a label topic.
   bool publish(const DdsImageView& image);
   /// The oldest label image not yet taken; examines at most kKeptImages images. False if there is none.
   bool takeLabels(DdsImage& image);
-  /// Writers of the label topic that are there now.
+  /// Current number of writers of the label topic.
   [[nodiscard]] int labellers() const;
 
-  /// Subscribers of the odometry that are there now.
+  /// Current number of subscribers of the odometry.
   [[nodiscard]] int subscribers() const;
   [[nodiscard]] DdsCounters counters() const;
 
  private:
   struct Entities;
   bool wrote(std::int32_t result);
-  /// The points in Entities::bytes: fields of 32 bits by their names, the last one an integer. `dense`: all
-  /// points are somewhere.
+  /// Publishes the points in Entities::bytes: 32-bit fields with these names, the last one an integer.
+  /// `dense`: no point is NaN.
   bool publishPoints(std::int32_t writer, Stamp stamp, std::string_view frame, bool dense,
                      std::span<const char* const> fields);
 

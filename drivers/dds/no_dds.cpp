@@ -1,4 +1,4 @@
-// Stands in for dds_domain.cpp and topic_reader.cpp in builds without Cyclone DDS.
+// Replaces dds_domain.cpp and topic_reader.cpp in builds without Cyclone DDS.
 
 #include <memory>
 #include <string>

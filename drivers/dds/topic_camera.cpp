@@ -15,9 +15,9 @@ namespace swiftlet {
 namespace {
 
 constexpr Duration kPatienceInFlight = Duration::fromMilliseconds(100);
-/// Messages of one call of next(), of which none is of use: more than can wait.
+/// Messages that one call of next() skips at most: more than can wait.
 constexpr int kMostLeftOut = 2 * TopicReader::kKeptImages;
-/// A longer one is a silence, which is said.
+/// A longer gap is reported as silence, not as missed frames.
 constexpr double kLongestHole = 1;  // s
 constexpr PixelFormat kPicture = {{"JPEG"}, PixelLayout::kJpeg};
 

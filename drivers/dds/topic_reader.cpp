@@ -53,15 +53,15 @@ struct TopicReader::Entities {
   const TopicBell* bell = nullptr;
   dds_entity_t topic = 0;
   dds_entity_t reader = 0;
-  // Of the library's threads.
+  // Written by the library's threads.
   std::atomic<std::uint64_t> came{0};
   std::atomic<std::uint64_t> lost{0};
-  std::uint64_t kept = 0;   ///< that may wait
-  std::uint64_t taken = 0;  ///< with data
+  std::uint64_t kept = 0;   ///< capacity for waiting messages
+  std::uint64_t taken = 0;  ///< messages with data
   std::uint64_t overrun = 0;
-  std::uint64_t came_before = 0, taken_before = 0;  ///< when none waited last
+  std::uint64_t came_before = 0, taken_before = 0;  ///< at the last time none was waiting
 
-  /// What was taken last; its sequences' memory is used again.
+  /// The message taken last; the memory of its sequences is reused.
   union Message {
     sensor_msgs_msg_dds__Image_ image;
     sensor_msgs_msg_dds__CompressedImage_ picture;
@@ -69,7 +69,8 @@ struct TopicReader::Entities {
     sensor_msgs_msg_dds__CameraInfo_ info;
   } message{};
 
-  /// None waits: of so many that all places were taken, those beyond were overrun.
+  /// Call when none is waiting. If at least `kept` messages were taken since the last call, those that
+  /// arrived beyond them were overrun.
   void noteEmpty(std::uint64_t came_by_now) {
     const std::uint64_t came_since = came_by_now - came_before;
     const std::uint64_t taken_since = taken - taken_before;
@@ -82,7 +83,7 @@ struct TopicReader::Entities {
   Entities(const Entities&) = delete;
   Entities& operator=(const Entities&) = delete;
   ~Entities() {
-    // The reader first: it waits for its listener.
+    // Delete the reader first: this waits for its listener.
     if (reader > 0) dds_delete(reader);
     if (topic > 0) dds_delete(topic);
     dds_sample_free(&message, &descriptorOf(type), DDS_FREE_CONTENTS);
@@ -132,7 +133,8 @@ bool TopicReader::open(std::shared_ptr<DdsDomain> domain, TopicType type, const 
 bool TopicReader::takeNext() {
   if (!entities_) return false;
   Entities& e = *entities_;
-  constexpr int kMost = kKeptSamples;  // of those without data, which say that a publisher has gone
+  constexpr int kMost = kKeptSamples;  // limit of messages without data, which only say that a publisher has
+                                       // left
   for (int looked = 0; looked < kMost; ++looked) {
     const std::uint64_t came = e.came.load(std::memory_order_relaxed);
     void* sample = &e.message;

@@ -1,12 +1,13 @@
 #pragma once
-// Messages of one ROS 2 topic as they come: images, pictures, inertial samples, calibrations.
+// Reads the messages of one ROS 2 topic: images, compressed images, inertial samples, camera calibrations.
 //
-// Quality: best effort and volatile, which every publisher of ROS 2 meets; the newest kKeptImages images or
-// kKeptSamples samples wait to be taken. Nothing is believed but that the message has its type: sizes,
-// encodings and numbers are as the publisher wrote them.
+// Quality of service: best effort and volatile, which matches every ROS 2 publisher. The newest kKeptImages
+// images or kKeptSamples samples wait to be taken. Only the message's type is checked: sizes, encodings and
+// numbers are as the publisher wrote them.
 //
-// Threads: one. It allocates and locks: not for a thread of the flight path. Memory: the messages that wait,
-// and one of each largest size seen. Errors: open() says why not. Without DDS in the build it never opens.
+// Threads: one. It allocates and locks: not for a thread of the flight path. Memory: the waiting messages,
+// and one of each largest size seen. Errors: open() returns the reason. Without DDS in the build it never
+// opens.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -21,21 +22,21 @@
 
 namespace swiftlet {
 
-/// sensor_msgs/Image or CompressedImage. It lies in the reader's memory until the next take().
+/// sensor_msgs/Image or CompressedImage. Its data stay in the reader's memory until the next take().
 struct TopicImage {
-  Stamp stamp;                ///< the header's, CLOCK_REALTIME
-  bool compressed = false;    ///< a picture: JPEG or PNG by its first bytes
-  std::string_view encoding;  ///< "mono8"; of a picture its format, "jpeg"
+  Stamp stamp;                ///< from the header, CLOCK_REALTIME
+  bool compressed = false;    ///< compressed image: JPEG or PNG by its first bytes
+  std::string_view encoding;  ///< "mono8"; for a compressed image its format, "jpeg"
   bool big_endian = false;
   std::uint32_t width = 0;   ///< px; 0 for a compressed image, as are height and step
   std::uint32_t height = 0;  ///< px
-  std::uint32_t step = 0;    ///< bytes from row to row
+  std::uint32_t step = 0;    ///< bytes per row
   std::span<const std::uint8_t> data;
 };
 
 /// sensor_msgs/Imu.
 struct TopicImu {
-  Stamp stamp;            ///< the header's, CLOCK_REALTIME
+  Stamp stamp;            ///< from the header, CLOCK_REALTIME
   Eigen::Vector3d gyro;   ///< rad/s
   Eigen::Vector3d accel;  ///< m/s^2
 };
@@ -45,7 +46,7 @@ enum class TopicType : std::uint8_t { kImage, kCompressedImage, kImu, kCameraInf
 /// "sensor_msgs/msg/Image".
 [[nodiscard]] const char* rosName(TopicType type);
 
-/// Rings when messages arrive; one for all readers of a thread.
+/// Signals the arrival of messages; one bell for all readers of a thread.
 class TopicBell {
  public:
   TopicBell();
@@ -53,12 +54,12 @@ class TopicBell {
   TopicBell(const TopicBell&) = delete;
   TopicBell& operator=(const TopicBell&) = delete;
 
-  /// Readable from a ring to the next clear().
+  /// Readable from a ring until the next clear().
   [[nodiscard]] int fd() const { return fd_; }
   void ring() const;
   /// Call before taking the messages: later arrivals ring again.
   void clear() const;
-  /// Until it rings, at most so long.
+  /// Waits until it rings, at most `longest`.
   void wait(Duration longest) const;
 
  private:
@@ -68,7 +69,7 @@ class TopicBell {
 struct TopicCounters {
   std::uint64_t taken = 0;
   std::uint64_t overrun = 0;  ///< overwritten by newer ones before they were taken
-  std::uint64_t lost = 0;     ///< on the way, as far as DDS knows
+  std::uint64_t lost = 0;     ///< lost in transport, as far as DDS knows
 };
 
 class TopicReader {
@@ -81,23 +82,23 @@ class TopicReader {
   TopicReader(const TopicReader&) = delete;
   TopicReader& operator=(const TopicReader&) = delete;
 
-  /// Once; `bell` outlives this. False, with `error`: a name that is none, or the library's words.
+  /// Call once; `bell` must outlive this. False, with `error`: an invalid name, or the library's message.
   [[nodiscard]] bool open(std::shared_ptr<DdsDomain> domain, TopicType type, const std::string& name,
                           const TopicBell& bell, std::string& error);
   [[nodiscard]] bool isOpen() const { return entities_ != nullptr; }
 
-  /// The oldest message that waits, where the topic is of this type; false: there is none.
+  /// The oldest waiting message, if the topic has this type; false: none.
   bool take(TopicImage& image);
   bool take(TopicImu& sample);
   bool take(CameraInfo& info);
 
-  /// Publishers of this topic and type that are there now.
+  /// Current number of publishers of this topic and type.
   [[nodiscard]] int publishers() const;
   [[nodiscard]] TopicCounters counters() const;
 
  private:
   struct Entities;
-  /// The next message with data into the reader's memory.
+  /// Takes the next message with data into the reader's memory.
   bool takeNext();
 
   std::unique_ptr<Entities> entities_;

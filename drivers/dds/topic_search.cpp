@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-/// Letters to insert, delete or replace (Levenshtein).
+/// Number of letters to insert, delete or replace (Levenshtein).
 std::size_t editDistance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
