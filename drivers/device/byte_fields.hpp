@@ -1,8 +1,8 @@
 #pragma once
-// Numbers in messages, field by field, in either byte order, on machines of either byte order.
+// Reads and writes the numbers of a message field by field, in either byte order, on any machine.
 //
-// Both sides are safe for any length: reading past the end gives zeros, writing past it writes nothing, and
-// ok() is false afterwards. No allocation; the bytes belong to the caller.
+// Safe for any length: reading past the end gives zeros, writing past it writes nothing, and ok() is false
+// afterwards. No allocation; the bytes belong to the caller.
 
 #include <Eigen/Core>
 
@@ -27,7 +27,7 @@ class FieldReader {
   std::int64_t i64() { return static_cast<std::int64_t>(u64()); }
   float f32() { return std::bit_cast<float>(u32()); }
   double f64() { return std::bit_cast<double>(u64()); }
-  /// Three f32, widened without change.
+  /// Three f32, converted exactly.
   Eigen::Vector3d vectorF32() {
     const double x = f32(), y = f32(), z = f32();
     return {x, y, z};
@@ -40,7 +40,7 @@ class FieldReader {
     at_ += count;
   }
 
-  /// The next `count` bytes; none where fewer are left.
+  /// The next `count` bytes; empty if fewer are left.
   std::span<const std::uint8_t> bytes(std::size_t count) {
     const std::span<const std::uint8_t> taken = count > left() ? bytes_.last(0) : bytes_.subspan(at_, count);
     skip(count);
@@ -48,7 +48,7 @@ class FieldReader {
   }
 
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
-  /// False when a field lay past the end.
+  /// False after reading past the end.
   [[nodiscard]] bool ok() const { return !failed_; }
 
  private:
@@ -93,9 +93,9 @@ class FieldWriter {
     for (const std::uint8_t byte : bytes) u8(byte);
   }
 
-  /// What was written so far.
+  /// The bytes written so far.
   [[nodiscard]] std::span<std::uint8_t> written() const { return bytes_.first(at_); }
-  /// False when a field did not fit.
+  /// False if a field did not fit.
   [[nodiscard]] bool ok() const { return !failed_; }
 
  private:

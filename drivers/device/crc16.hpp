@@ -1,10 +1,10 @@
 #pragma once
 // The two 16-bit checksums of sensor links, polynomial x^16 + x^12 + x^5 + 1 (0x1021).
 //
-// crc16Ccitt: most significant bit first; begun with 0 it is CRC-16/XMODEM (VectorNav), with 0xFFFF
+// crc16Ccitt: most significant bit first; initial value 0 gives CRC-16/XMODEM (VectorNav), 0xFFFF gives
 //   CRC-16/CCITT-FALSE (DroneCAN, the bridge framing).
-// crc16Mcrf4xx: least significant bit first; begun with 0xFFFF it is CRC-16/MCRF4XX (MAVLink).
-// Cost: one look-up a byte in a table of 512 bytes.
+// crc16Mcrf4xx: least significant bit first; initial value 0xFFFF gives CRC-16/MCRF4XX (MAVLink).
+// Cost: one look-up per byte in a table of 512 bytes.
 // Source: G. Cook, "Catalogue of parametrised CRC algorithms".
 
 #include <array>
@@ -43,7 +43,7 @@ inline constexpr Table kReflectedTable = makeReflectedTable();
 
 }  // namespace crc16
 
-/// CRC of `bytes`, continuing from `before`.
+/// CRC of `bytes`, continuing from the value `before`.
 constexpr std::uint16_t crc16Ccitt(std::uint16_t before, std::span<const std::uint8_t> bytes) {
   std::uint16_t crc = before;
   for (const std::uint8_t byte : bytes) {

@@ -25,14 +25,15 @@ namespace swiftlet {
 
 enum class FrameVerdict : std::uint8_t {
   kNotHere,      ///< no frame begins at the first byte
-  kIncomplete,   ///< one may: more bytes are needed. Not to be said with longest frame's length at hand
-  kBadChecksum,  ///< one seemed to
-  kWhole,        ///< one does, of `length` bytes
+  kIncomplete,   ///< a frame may begin here, but more bytes are needed; not allowed once the longest frame
+                 ///< would fit
+  kBadChecksum,  ///< a frame seemed to begin here, but its checksum is wrong
+  kWhole,        ///< a frame of `length` bytes begins here
 };
 
 struct FrameCheck {
   FrameVerdict verdict = FrameVerdict::kNotHere;
-  std::size_t length = 0;  ///< of a whole frame
+  std::size_t length = 0;  ///< of a complete frame
 };
 
 /// Valid until the next feed().
@@ -44,12 +45,12 @@ struct StampedFrame {
 template <std::size_t kLongestFrame>
 class FrameBuffer {
  public:
-  /// Bytes that feed() accepts for certain after next() has returned false: more than a serial port's kernel
-  /// buffer.
+  /// Number of bytes that feed() always accepts after next() has returned false: more than the kernel buffer
+  /// of a serial port.
   static constexpr std::size_t kMostFed = 4096;
 
-  /// Accepts as many bytes from the front of `bytes` as fit and returns their number; all of kMostFed bytes
-  /// after next() has returned false.
+  /// Accepts as many bytes from the front of `bytes` as fit and returns their number. After next() has
+  /// returned false, at least kMostFed bytes fit.
   [[nodiscard]] std::size_t feed(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time,
                                  StreamCounters& counters) {
     if (bytes.size() > bytes_.size() - end_) moveToFront();
@@ -65,8 +66,8 @@ class FrameBuffer {
   }
 
   /// The next complete frame, if there is one. `check(std::span<const std::uint8_t>) -> FrameCheck` examines
-  /// the bytes from one position on; except for kIncomplete its result for a position must not change when
-  /// more bytes arrive.
+  /// the bytes from one position on. Unless it is kIncomplete, its result must not change when more bytes
+  /// arrive.
   template <typename Check>
   bool next(Check&& check, StampedFrame& frame, StreamCounters& counters) {
     while (begin_ < end_) {
@@ -86,9 +87,9 @@ class FrameBuffer {
     return false;
   }
 
-  /// Bytes that wait for the rest of their frame.
+  /// Bytes of a frame that is not yet complete.
   [[nodiscard]] std::size_t waiting() const { return end_ - begin_; }
-  /// Forgets them, after the device was gone; they count as skipped.
+  /// Drops them, for instance after the device was unplugged; they count as skipped.
   void clear(StreamCounters& counters) {
     counters.skipped_bytes += waiting();
     begin_ = end_ = 0;

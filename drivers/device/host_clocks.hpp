@@ -1,6 +1,6 @@
 #pragma once
-// The host's two clocks at one moment: CLOCK_MONOTONIC, which stamps are of, and CLOCK_REALTIME, the wall's.
-// NTP slews both alike and steps the wall's only. Some 0.3 us.
+// Reads the host's two clocks at one moment: CLOCK_MONOTONIC, used for stamps, and CLOCK_REALTIME, the wall
+// clock. NTP slews both equally and steps only the wall clock. Cost: about 0.3 us.
 
 #include <cstdlib>
 #include <ctime>
@@ -12,10 +12,10 @@ namespace swiftlet {
 struct HostClocks {
   Stamp monotonic;
   Duration realtime_ahead;  ///< CLOCK_REALTIME - CLOCK_MONOTONIC
-  Duration error;           ///< of realtime_ahead, at most
+  Duration error;           ///< maximum error of realtime_ahead
 };
 
-/// The wall clock between two readings of the steady one; of three tries the one that was disturbed least.
+/// Reads the wall clock between two readings of the monotonic clock, three times, and keeps the narrowest.
 [[nodiscard]] inline HostClocks readHostClocks() {
   constexpr int kTries = 3;
   HostClocks best;
@@ -32,12 +32,12 @@ struct HostClocks {
   return best;
 }
 
-/// Whether the wall's clock was stepped between two readings: by more than their errors.
+/// Whether the wall clock was stepped between two readings: by more than their errors.
 [[nodiscard]] inline bool steppedBetween(const HostClocks& older, const HostClocks& newer) {
   return std::abs((newer.realtime_ahead - older.realtime_ahead).ns) > older.error.ns + newer.error.ns;
 }
 
-/// The better known of two readings, unless the clock was stepped between them: then the newer.
+/// The more accurate of two readings; the newer one if the wall clock was stepped between them.
 [[nodiscard]] inline HostClocks betterOf(const HostClocks& older, const HostClocks& newer) {
   return steppedBetween(older, newer) || newer.error <= older.error ? newer : older;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// One reading as an inertial sensor's decoder gives it: its own axes, its own clock, the host's time of
-// arrival. `drivers/timesync` makes an ImuSample's stamp of it, the vehicle's settings its axes.
+// One reading of an inertial sensor as its decoder gives it: sensor axes, sensor clock, host arrival time.
+// `drivers/timesync` computes the stamp of an ImuSample from it, the vehicle's settings the body axes.
 
 #include <Eigen/Core>
 
@@ -12,13 +12,14 @@
 namespace swiftlet {
 
 struct ImuReading {
-  Stamp arrival;                         ///< CLOCK_MONOTONIC, of the message's first byte or frame
-  std::optional<Stamp> device;           ///< the sensor's own clock, unwrapped; empty: it sends none
-  std::optional<std::uint64_t> counter;  ///< the sensor's own count, unwrapped; empty: it sends none
+  Stamp arrival;                         ///< CLOCK_MONOTONIC, of the first byte or frame of the message
+  std::optional<Stamp> device;           ///< the sensor's own clock, unwrapped; empty if it sends none
+  std::optional<std::uint64_t> counter;  ///< the sensor's own sample counter, unwrapped; empty if it sends
+                                         ///< none
   Eigen::Vector3d gyro;                  ///< angular rate [rad/s]
   Eigen::Vector3d accel;                 ///< specific force [m/s^2]: +9.81 along the axis that points up
-  Duration mean_age = {};                ///< by which the values' middle lies before `device`: they are means
-  /// Of `device`'s place, CLOCK_MONOTONIC, where the driver maps its clock itself.
+  Duration mean_age = {};  ///< if the values are means: time from the middle of their interval to `device`
+  /// CLOCK_MONOTONIC stamp of the reading, if the driver maps the sensor's clock itself.
   std::optional<Stamp> host = {};
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// The host's one clock, CLOCK_MONOTONIC. Some 30 ns.
+// The host's clock CLOCK_MONOTONIC. Cost: about 30 ns.
 
 #include <ctime>
 
