@@ -3,7 +3,7 @@
 namespace swiftlet {
 namespace {
 
-// A count that goes back began anew; more than this is no gap either (a day at 1 kHz is less).
+// A larger gap is a counter that restarted (a day at 1 kHz is less).
 constexpr std::uint32_t kMostMissed = 1U << 27U;
 
 }  // namespace
@@ -15,7 +15,7 @@ std::uint64_t EdgeGaps::add(const EdgeEvent& event) {
     if (gap < kMostMissed) lacking = gap;
     sequence_ = *event.sequence;
   } else if (any_ && period_.ns > 0 && event.stamp > newest_) {
-    // Unsigned: the difference of any two stamps in order.
+    // Unsigned, so that the difference of any two ordered stamps fits.
     const std::uint64_t passed =
         static_cast<std::uint64_t>(event.stamp.ns) - static_cast<std::uint64_t>(newest_.ns);
     const auto period = static_cast<std::uint64_t>(period_.ns);

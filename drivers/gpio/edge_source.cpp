@@ -16,7 +16,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kAtOnce = 16;  // events a system call: 768 bytes on the stack
+constexpr std::size_t kAtOnce = 16;  // events per system call: 768 bytes on the stack
 constexpr const char* kConsumer = "swiftlet";
 
 DeviceFault requestFault(int error, const GpioLine& line) {
@@ -47,7 +47,7 @@ DeviceFault EdgeSource::open(const EdgeSourceSettings& settings) {
   gaps_ = EdgeGaps(settings.edges == EdgeKind::kBoth ? Duration{} : settings.period);
   if (settings.interface != EdgeInterface::kLibgpiod) {
     fault = openKernel(chip.fd(), line.offset, settings);
-    // A kernel that does not know the call says one of these.
+    // Errors of a kernel that does not know the call.
     const bool unknown = fault.error == ENOTTY || fault.error == EINVAL;
     const bool other = settings.interface == EdgeInterface::kAny && hasLibgpiod() && unknown;
     if (!other) return fault.ok() ? fault : requestFault(fault.error, line);
@@ -72,7 +72,7 @@ DeviceFault EdgeSource::openKernel(int chip, std::uint32_t offset, const EdgeSou
   request.num_lines = 1;
   request.event_buffer_size = settings.buffer;
   std::snprintf(request.consumer, sizeof request.consumer, "%s", kConsumer);
-  // Without a flag for another clock, stamps are of CLOCK_MONOTONIC.
+  // Without a flag for another clock the kernel stamps with CLOCK_MONOTONIC.
   request.config.flags = GPIO_V2_LINE_FLAG_INPUT;
   if (settings.edges != EdgeKind::kFalling) request.config.flags |= GPIO_V2_LINE_FLAG_EDGE_RISING;
   if (settings.edges != EdgeKind::kRising) request.config.flags |= GPIO_V2_LINE_FLAG_EDGE_FALLING;
@@ -91,7 +91,7 @@ DeviceFault EdgeSource::openKernel(int chip, std::uint32_t offset, const EdgeSou
 }
 
 DeviceFault EdgeSource::gone() const {
-  // Nothing to read, and nothing ever again: older kernels say so here only.
+  // No data: older kernels report a removed chip only through poll().
   pollfd p{fd_, POLLIN, 0};
   if (poll(&p, 1, 0) > 0 && (p.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) {
     return deviceFault(DeviceFaultKind::kUnplugged, ENODEV, "the GPIO chip was removed");

@@ -1,11 +1,13 @@
 #pragma once
-// The edges of one GPIO line with the kernel's stamps, in CLOCK_MONOTONIC.
+// Reads the edges of one GPIO line with the kernel's stamps, in CLOCK_MONOTONIC.
 //
-// Through the kernel's v2 line events, which number the events of a line, so that a lost one is seen; or,
-// where the kernel has none of these (before 5.10), through libgpiod 1.6, when it was there at build time:
-// there only a gap in time shows the loss, and only when the period is known.
+// It uses the kernel's v2 line events, which are numbered per line, so lost events are detected. On kernels
+// before 5.10, which do not have them, it uses libgpiod 1.6 if it was present at build time: lost events are
+// then detected only by a gap in time, and only if the period is known.
 //
-// open() allocates and may be called again after any fault, for the chip that was pulled out and came back;
+// open() allocates and may be called again after any fault, for instance when a removed chip is back. read()
+// does not wait, allocate or throw. The kernel keeps `buffer` events for a slow reader and then drops the
+// oldest (libgpiod: keeps 16 and drops the newest). Memory: 200 bytes; read(): one system call per 16 events.
 // read() does not wait, allocate or throw. The kernel keeps `buffer` events for a reader that is late; then
 // it drops the oldest (libgpiod: 16, the newest). Memory: 200 bytes; read(): one system call for 16 events.
 
@@ -25,10 +27,10 @@ namespace swiftlet {
 enum class EdgeInterface : std::uint8_t { kAny, kKernel, kLibgpiod };
 
 struct EdgeSourceSettings {
-  std::string chip;  ///< path, name or label: GpioChip::open
+  std::string chip;  ///< path, name or label; see GpioChip::open
   std::string line;  ///< offset or name
   EdgeKind edges = EdgeKind::kRising;
-  Duration period = {};        ///< between edges of that kind; zero: not known
+  Duration period = {};        ///< between edges of the selected kind; zero: unknown
   std::uint32_t buffer = 256;  ///< events: 12 s at 20 Hz
   EdgeInterface interface = EdgeInterface::kAny;
 };
@@ -43,19 +45,19 @@ class EdgeSource {
   DeviceFault open(const EdgeSourceSettings& settings);
   void close();
   [[nodiscard]] bool isOpen() const { return fd_ >= 0; }
-  /// For poll(): readable when edges wait, in error or hung up when the chip went. -1 when closed.
+  /// For poll(): readable when edges wait, error or hang-up when the chip was removed. -1 when closed.
   [[nodiscard]] int fd() const { return fd_; }
   /// kKernel or kLibgpiod, once open.
   [[nodiscard]] EdgeInterface interface() const { return interface_; }
 
-  /// Takes waiting edges, at most `out.size()`; `count` may be 0. After a fault, reopen with open().
+  /// Takes waiting edges, at most `out.size()`; `count` can be 0. After a fault, reopen with open().
   DeviceFault read(std::span<EdgeEvent> out, std::size_t& count);
 
   /// Since the first open().
   [[nodiscard]] std::uint64_t edges() const { return edges_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }
 
-  /// Whether libgpiod was there when this was built.
+  /// Whether libgpiod was present at build time.
   static bool hasLibgpiod();
 
  private:
@@ -68,7 +70,7 @@ class EdgeSource {
 
   int fd_ = -1;
   EdgeInterface interface_ = EdgeInterface::kAny;
-  gpiod_chip* chip_ = nullptr;  ///< of libgpiod
+  gpiod_chip* chip_ = nullptr;  ///< handle of libgpiod
   gpiod_line* line_ = nullptr;
   EdgeGaps gaps_;
   std::uint64_t edges_ = 0;

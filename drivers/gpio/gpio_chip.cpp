@@ -15,7 +15,7 @@
 namespace swiftlet {
 namespace {
 
-/// Of a field that ends with 0 or with its size.
+/// Text of a field that ends with 0 or at its full size.
 template <std::size_t kSize>
 std::string fieldText(const char (&field)[kSize]) {
   return {field, strnlen(field, kSize)};
@@ -32,7 +32,7 @@ std::vector<std::string> chipPaths() {
     }
   }
   closedir(folder);
-  // By number: shorter names first.
+  // Sort by number: shorter names first.
   std::sort(paths.begin(), paths.end(), [](const std::string& a, const std::string& b) {
     return a.size() != b.size() ? a.size() < b.size() : a < b;
   });
@@ -76,14 +76,14 @@ DeviceFault GpioChip::open(const std::string& which) {
     offers += (offers.empty() ? "" : ", ") + name_ + " (" + label_ + ")";
   }
   close();
-  // The one that is meant may be among those that this user may not open.
+  // The wanted chip may be among those that this user may not open.
   if (!refused.ok()) return refused;
   return deviceFault(DeviceFaultKind::kMissing, 0, "no GPIO chip is named '%s'; available: %s", which.c_str(),
                      offers.empty() ? "none" : offers.c_str());
 }
 
 DeviceFault GpioChip::line(std::uint32_t offset, GpioLine& out) const {
-  // The first version of this call: both libraries' kernels have it.
+  // Version 1 of this call: available in all supported kernels.
   gpioline_info info{};
   info.line_offset = offset;
   if (ioctl(fd_, GPIO_GET_LINEINFO_IOCTL, &info) != 0) {

@@ -12,12 +12,12 @@ namespace swiftlet {
 struct GpioLine {
   std::uint32_t offset = 0;
   std::string name;      ///< often empty
-  std::string consumer;  ///< name of the program that holds it; empty: free or unnamed
+  std::string consumer;  ///< name of the program that uses it; empty: free or unnamed
   bool used = false;
   bool output = false;
 };
 
-/// An open chip, to be asked; a line that was requested through it outlives it.
+/// An open chip for queries; a line requested through it stays valid after the chip is closed.
 class GpioChip {
  public:
   GpioChip() = default;

@@ -20,7 +20,7 @@ std::int64_t nanoseconds(const timespec& t) {
   return static_cast<std::int64_t>(t.tv_sec) * kSecond + t.tv_nsec;
 }
 
-/// Kernels before 5.7 stamp in real time, decades ahead of a clock that began at the start.
+/// Whether a stamp is in CLOCK_REALTIME, as of kernels before 5.7: it is decades ahead of CLOCK_MONOTONIC.
 bool inRealtime(Stamp stamp) {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);

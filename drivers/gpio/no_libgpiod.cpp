@@ -1,4 +1,4 @@
-// EdgeSource where libgpiod was not there at build time: the kernel's own events only.
+// EdgeSource in builds without libgpiod: only the kernel's own events.
 #include "drivers/gpio/edge_source.hpp"
 
 namespace swiftlet {
