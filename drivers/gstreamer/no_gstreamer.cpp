@@ -1,4 +1,4 @@
-// Stands in for pipeline_source.cpp in builds without GStreamer.
+// Replaces pipeline_source.cpp in builds without GStreamer.
 
 #include <utility>
 

@@ -14,12 +14,13 @@
 namespace swiftlet {
 namespace {
 
-/// Of the first open(): the pipeline's own limits, and what a first look at all plugins takes.
+/// Wait of the first open(): the pipeline's own start limits, plus GStreamer's first scan of its plugins.
 constexpr Duration kPatienceAtStart = Duration::fromMilliseconds(15'000);
-/// Of a caller in flight, who has other things to do.
+/// Wait of later calls, in flight.
 constexpr Duration kPatienceInFlight = Duration::fromMilliseconds(100);
-constexpr double kRateTolerance = 0.005;  // of the rate, as for V4L2's
-/// A larger step of GST_BUFFER_OFFSET is no hole: it counts something else (bytes of a file), or began anew.
+constexpr double kRateTolerance = 0.005;  // relative; the same as for V4L2
+/// A larger step of GST_BUFFER_OFFSET is not a gap: the source counts something else (bytes of a file) or
+/// restarted.
 constexpr std::uint64_t kLargestHole = 1000;
 
 template <std::size_t kSize>
@@ -40,15 +41,15 @@ struct PipelineSource::Pipeline {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  /// An image in someone's hands: mapped.
+  /// A lent image: mapped.
   struct Lent {
     GstSample* sample = nullptr;
     GstVideoFrame frame = {};
   };
 
-  /// Reads a sample's caps, where they are not those of before.
+  /// Reads a sample's caps if they have changed.
   DeviceFault readCaps(GstSample* sample, const PipelineSettings& settings);
-  /// How many frames a sample is after the one before, and which of them it is.
+  /// Number of frames since the previous sample; updates `sequence`.
   std::uint64_t stepTo(const PipelineSample& sample);
   void letGo(Lent& one) {
     gst_video_frame_unmap(&one.frame);
@@ -66,11 +67,11 @@ struct PipelineSource::Pipeline {
   GstCaps* caps = nullptr;
   GstVideoInfo info = {};
   PixelFormat format;
-  PipelineSample first;  ///< looked at by open(), and not yet given out
+  PipelineSample first;  ///< taken by open() but not yet returned
   std::array<Lent, kMostLent> lent;
   bool counting = false;
   std::uint64_t offset = 0;  ///< of the newest sample
-  std::uint64_t number = 0;  ///< likewise
+  std::uint64_t number = 0;  ///< number of the newest sample
   std::uint64_t sequence = 0;
 };
 
@@ -130,7 +131,7 @@ DeviceFault PipelineSource::open() {
   DeviceFault fault = p.running->start(opened_ ? kPatienceInFlight : kPatienceAtStart);
   if (!fault.ok()) return fault;
   open_ = true;
-  // start() waited for two, of which the first says less.
+  // start() waited for two samples; the first one may have no stamp.
   PipelineSample unseen;
   if (p.running->take(unseen)) gst_sample_unref(unseen.sample);
   if (!p.running->take(p.first)) return closedBy(deviceFault(DeviceFaultKind::kSilent, 0, "no image"));
@@ -176,7 +177,7 @@ DeviceFault PipelineSource::next(CapturedFrame& frame) {
   Pipeline& p = *pipeline_;
   auto* const free = std::ranges::find(p.lent, nullptr, &Pipeline::Lent::sample);
   if (free == p.lent.end()) return {};
-  // Each refused sample is let go, so that one call cannot be kept busy for ever.
+  // Bounded, so that refused samples cannot keep one call busy forever.
   for (std::size_t attempt = 0; attempt < RunningPipeline::kMostWaiting; ++attempt) {
     PipelineSample sample = std::exchange(p.first, {});
     if (sample.sample == nullptr && !p.running->take(sample)) {
@@ -197,7 +198,7 @@ DeviceFault PipelineSource::next(CapturedFrame& frame) {
     }
     GstBuffer* buffer = gst_sample_get_buffer(sample.sample);
     const bool damaged = GST_BUFFER_FLAG_IS_SET(buffer, GST_BUFFER_FLAG_CORRUPTED);
-    // What is too small for its caps cannot be mapped.
+    // A buffer that is too small for its caps cannot be mapped.
     if (damaged || gst_video_frame_map(&free->frame, &p.info, buffer, GST_MAP_READ) == FALSE) {
       ++(damaged ? counters_.damaged : counters_.too_short);
       gst_sample_unref(sample.sample);

@@ -1,22 +1,22 @@
 #pragma once
 // A camera behind a GStreamer pipeline that the user writes, without a sink: "libcamerasrc ! video/x-raw,..."
-// Its images are lent out as they lie in the pipeline's memory. docs/gstreamer.md has recipes.
+// Its images are lent in the pipeline's memory. docs/gstreamer.md has recipes.
 //
-// Formats: GRAY8, GRAY16_LE, NV12, NV21, I420, YV12, NV16, Y42B, YUY2, YVYU, UYVY, VYUY, whose luma is taken
-// as it is; the pipeline converts all others (`videoconvert`). The size must be the one asked for. Stamps:
-// PTS as running time plus the pipeline's base time, CLOCK_MONOTONIC: the pipeline is held to that clock.
-// What moment a PTS marks no pipeline says: it is taken for the start of the exposure, of the first row where
-// the shutter rolls. Where a source stamps arrivals (a network's, or one with `do-timestamp`), or buffers
-// have no PTS, the event is kArrival and a warning says so.
-// Losses: holes in GST_BUFFER_OFFSET where the source counts its frames there; images that came while three
+// Formats: GRAY8, GRAY16_LE, NV12, NV21, I420, YV12, NV16, Y42B, YUY2, YVYU, UYVY, VYUY, whose luma is used
+// unchanged; the pipeline must convert all others (`videoconvert`). The size must be the requested one.
+// Stamps: PTS as running time plus the pipeline's base time, in CLOCK_MONOTONIC, which the pipeline is forced
+// to use. Pipelines do not say which event a PTS marks: the start of the exposure is assumed, with a rolling
+// shutter that of the first row. If a source stamps arrivals (a network source, or one with `do-timestamp`)
+// or buffers have no PTS, the event is kArrival and a warning says so.
+// Losses: gaps in GST_BUFFER_OFFSET if the source counts its frames there; images that arrived while three
 // were waiting.
-// Errors: values. What GStreamer reports, and the end of the stream, closes the source; open() builds the
-// pipeline anew. The first open() waits for images, some seconds at most; later ones, in flight, a
-// tenth of a second at most, and the pipeline goes on starting meanwhile.
-// Threads: GStreamer's run under SCHED_OTHER. It allocates and locks, in next() and in giving frames back
-// too: not for a thread of the flight path. Memory: three images wait, kMostLent are lent out; what else the
-// pipeline holds is its own matter.
-// Built without GStreamer (SWIFTLET_WITH_GSTREAMER), open() says so.
+// Errors: values. An error reported by GStreamer, or the end of the stream, closes the source; open() builds
+// the pipeline again. The first open() waits for images, some seconds at most; later ones, in flight, wait a
+// tenth of a second at most while the pipeline continues to start.
+// Threads: GStreamer's run under SCHED_OTHER. next() and returning frames allocate and lock: not for a thread
+// of the flight path. Memory: three images wait, kMostLent are lent; the pipeline's own memory is not bounded
+// here.
+// Built without GStreamer (SWIFTLET_WITH_GSTREAMER), open() fails and says so.
 
 #include <array>
 #include <cstdint>
@@ -29,11 +29,11 @@
 namespace swiftlet {
 
 struct PipelineSettings {
-  std::string text;  ///< as gst-launch-1.0 takes it, without a sink
-  int width = 0;     ///< pixels, of both halves where two cameras share an image
+  std::string text;  ///< as for gst-launch-1.0, without a sink
+  int width = 0;     ///< pixels; if two cameras share an image, of both halves
   int height = 0;
-  double rate = 0;                   ///< frames a second; 0: as it is
-  std::optional<Duration> exposure;  ///< that the pipeline sets; empty: not known
+  double rate = 0;                   ///< frames per second; 0: as the pipeline gives it
+  std::optional<Duration> exposure;  ///< as set in the pipeline; empty: unknown
 };
 
 class PipelineSource : public CameraSource {
@@ -61,7 +61,7 @@ class PipelineSource : public CameraSource {
   PipelineSettings settings_;
   std::unique_ptr<Pipeline> pipeline_;
   bool open_ = false;
-  bool opened_ = false;  // ever
+  bool opened_ = false;  // at least once
 };
 
 }  // namespace swiftlet

@@ -16,15 +16,17 @@
 namespace swiftlet {
 namespace {
 
-/// From start to first image: a decoder waits for a whole group of pictures, a second or two as a rule.
+/// From start to the first image: a decoder waits for a complete group of pictures, usually one or two
+/// seconds.
 constexpr Duration kStartLimit = Duration::fromMilliseconds(5000);
-/// How long disposing waits for a pipeline to stop: a network source says goodbye to its server.
+/// How long dispose() waits for a pipeline to stop: a network source signs off at its server.
 constexpr Duration kStopLimit = Duration::fromMilliseconds(5000);
-/// GStreamer stamps a live source's first buffer with 0 where it has no time of its own.
+/// Two samples, because GStreamer stamps a live source's first buffer with 0 if the source has no time of its
+/// own.
 constexpr int kFirstSamples = 2;
 constexpr const char* kSinkName = "swiftlet_images";
 constexpr auto kEnds = static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_EOS);
-constexpr int kOfferBytes = 110;  // leaves room for the words around it in a fault
+constexpr int kOfferBytes = 110;  // leaves room for the other text of a fault
 
 void ring(int fd) {
   const std::uint64_t one = 1;
@@ -35,7 +37,7 @@ void hush(int fd) {
   static_cast<void>(!read(fd, &count, sizeof(count)));
 }
 
-/// The text of an error, released.
+/// Makes a fault of an error and frees the error.
 DeviceFault faultOf(DeviceFaultKind kind, GError* error) {
   const DeviceFault fault =
       deviceFault(kind, 0, "pipeline: %s", error == nullptr ? "no reason given" : error->message);
@@ -91,7 +93,7 @@ void RunningPipeline::dispose(std::unique_ptr<RunningPipeline> pipeline) {
       return;
     }
   }
-  // Leaked on purpose: the keeper may go on at any time.
+  // Leaked on purpose: the keeper may still return from GStreamer and use it.
   pthread_detach(self.keeper_);
   static_cast<void>(pipeline.release());
 }
@@ -207,7 +209,7 @@ DeviceFault RunningPipeline::build() {
   gst_object_ref_sink(pipeline_);
   sink_ = gst_bin_get_by_name(GST_BIN(pipeline_), kSinkName);
   GstCaps* caps = acceptedCaps(asked_.width, asked_.height, asked_.rate);
-  // Samples are taken as they come: none waits here, nor is the last one kept.
+  // Samples are taken as they arrive: none is queued in the sink, and the last one is not kept.
   g_object_set(sink_, "caps", caps, "sync", FALSE, "max-buffers", 1U, "enable-last-sample", FALSE, nullptr);
   gst_caps_unref(caps);
   GstAppSinkCallbacks callbacks = {};
@@ -219,7 +221,7 @@ DeviceFault RunningPipeline::build() {
 }
 
 DeviceFault RunningPipeline::play() {
-  // Whatever clock a source offers: running time + base time is then CLOCK_MONOTONIC.
+  // Use CLOCK_MONOTONIC instead of the source's clock, so that running time + base time is CLOCK_MONOTONIC.
   auto* clock = GST_CLOCK(gst_object_ref_sink(
       g_object_new(GST_TYPE_SYSTEM_CLOCK, "clock-type", GST_CLOCK_TYPE_MONOTONIC, nullptr)));
   gst_pipeline_use_clock(GST_PIPELINE(pipeline_), clock);
