@@ -2,8 +2,7 @@
 // A camera of any kind: frames lent one by one with their stamps, and counters.
 //
 // Threads: one. Nothing blocks: poll fd() for POLLIN, then call next() until it gives no frame. Errors:
-// values. A fault of next() closes the camera; open() reopens it when it is back and negotiates everything
-// again.
+// values. A fault of next() closes the camera; open() reopens it, with all negotiation, once it is back.
 
 #include <array>
 #include <cstddef>
@@ -22,18 +21,18 @@ namespace swiftlet {
 /// Which instant a source's stamp marks.
 enum class StampEvent : std::uint8_t {
   kStartOfExposure,
-  kEndOfExposure,  ///< of the first row: its data begin
+  kEndOfExposure,  ///< of the first row, when its readout begins
   kEndOfFrame,
-  kArrival,  ///< the capture's time is unknown: when the frame came to the host
+  kArrival,  ///< the capture time is unknown: when the frame arrived at the host
 };
 
-/// Exposure that can be set in flight: its range and the current setting.
+/// Exposure that can be set in flight: range and current setting.
 struct ExposureAbility {
   ExposureRange range;
   ExposureSetting now;
 };
 
-/// As negotiated and read back.
+/// Properties of the open camera, as negotiated and read back.
 struct CameraFacts {
   std::array<char, 17> driver = {};
   std::array<char, 33> card = {};
@@ -43,26 +42,27 @@ struct CameraFacts {
   int height = 0;
   int stride = 0;                    ///< bytes
   double rate = 0;                   ///< frames per second; 0: unknown
-  std::optional<Duration> exposure;  ///< empty: it cannot be known in units of time
+  std::optional<Duration> exposure;  ///< empty: not known in units of time
   std::optional<std::int32_t> gain;
   StampEvent event = StampEvent::kEndOfFrame;
   std::size_t buffers = 0;
 };
 
-/// Since construction, over unplugging.
+/// Since construction; unplugging does not reset them.
 struct CameraCounters {
-  std::uint64_t frames = 0;          ///< delivered
-  std::uint64_t missed = 0;          ///< holes in `sequence`: no buffer was free, or the driver dropped it
-  std::uint64_t damaged = 0;         ///< flagged by the driver and put back unseen, or not to be decoded
-  std::uint64_t too_short = 0;       ///< fewer bytes than the size; put back unseen
-  std::uint64_t stamp_ahead = 0;     ///< stamps later than their arrival
-  std::uint64_t requeue_failed = 0;  ///< buffers that could not be put back
+  std::uint64_t frames = 0;       ///< delivered
+  std::uint64_t missed = 0;       ///< gaps in `sequence`: no buffer was free, or the driver dropped the frame
+  std::uint64_t damaged = 0;      ///< flagged by the driver and returned without being delivered, or not
+                                  ///< decodable
+  std::uint64_t too_short = 0;    ///< fewer bytes than the size requires; returned without being delivered
+  std::uint64_t stamp_ahead = 0;  ///< stamps later than their arrival
+  std::uint64_t requeue_failed = 0;  ///< buffers that could not be returned to the driver
   std::uint64_t reopened = 0;
-  // Of topics.
-  std::uint64_t stale = 0;        ///< not newer than the one before: late or repeated; left out
-  std::uint64_t wrong_clock = 0;  ///< stamped by another clock than this computer's; left out
-  std::uint64_t lost = 0;         ///< on the way, as far as DDS knows; in `missed` too
-  std::uint64_t overrun = 0;      ///< not taken in time; in `missed` too
+  // Topics only.
+  std::uint64_t stale = 0;        ///< not newer than the previous one: late or repeated; skipped
+  std::uint64_t wrong_clock = 0;  ///< stamped by another clock than this computer's; skipped
+  std::uint64_t lost = 0;         ///< lost in transport, as far as DDS knows; included in `missed`
+  std::uint64_t overrun = 0;      ///< not taken in time; included in `missed`
 };
 
 class CameraSource;
@@ -80,8 +80,8 @@ class CapturedFrame {
   void release();
 
   RawImage image;
-  Stamp stamp;                                 ///< the source's, CLOCK_MONOTONIC
-  StampEvent event = StampEvent::kEndOfFrame;  ///< what it marks
+  Stamp stamp;                                 ///< from the source, CLOCK_MONOTONIC
+  StampEvent event = StampEvent::kEndOfFrame;  ///< the event that `stamp` marks
   Stamp arrival;                               ///< CLOCK_MONOTONIC, when it was taken from the source
   std::uint64_t sequence = 0;                  ///< the source's count, unwrapped; continues after a reopen
 
@@ -116,13 +116,13 @@ class CameraSource {
   /// Remarks about the camera that are not faults, for the user; call until it returns false.
   virtual bool nextRemark(DeviceFault& /*remark*/) { return false; }
 
-  /// The oldest frame that waits. Ok with `frame.valid()` false: none.
+  /// The oldest waiting frame. Ok with `frame.valid()` false: none.
   virtual DeviceFault next(CapturedFrame& frame) = 0;
 
-  /// Of an open source; empty: its exposure cannot be set in flight.
+  /// Call for an open source; empty: its exposure cannot be set in flight.
   [[nodiscard]] virtual std::optional<ExposureAbility> exposureAbility() const { return {}; }
-  /// For the images that follow, rounded to what the camera supports; the first call disables its automatic
-  /// control. Waits for the camera's bus, up to some ms.
+  /// Sets the exposure of later images, rounded to what the camera supports; the first call disables
+  /// automatic control. Waits for the camera's bus, up to some ms.
   virtual DeviceFault setExposure(const ExposureSetting& setting);
 
   [[nodiscard]] const CameraFacts& facts() const { return facts_; }
@@ -132,11 +132,11 @@ class CameraSource {
  protected:
   friend class CapturedFrame;
 
-  /// Makes `frame` one of this source, with a number for giveBack().
+  /// Makes `frame` a frame of this source; `buffer` is the number for giveBack().
   void lend(CapturedFrame& frame, std::uint32_t buffer);
-  /// The buffer of a frame that is let go.
+  /// Takes back the buffer of a released frame.
   virtual void giveBack(std::uint32_t buffer) = 0;
-  /// Called by every close: frames lent before are no longer returned.
+  /// Call in every close(): frames lent before are then no longer returned.
   void forgetLent() { ++generation_; }
   void warn(const DeviceFault& fault);
 

@@ -14,7 +14,7 @@ namespace {
 constexpr std::array<std::uint8_t, 3> kJpegMagic = {0xFF, 0xD8, 0xFF};
 constexpr std::array<std::uint8_t, 8> kPngMagic = {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
 
-/// Bytes a pixel.
+/// Bytes per pixel.
 enum class Grey : std::uint8_t { k8 = 1, k16 = 2 };
 
 struct PngInput {
@@ -43,7 +43,7 @@ void askForGrey8(png_structp png, png_infop info) {
   if ((type & PNG_COLOR_MASK_ALPHA) != 0) png_set_strip_alpha(png);
 }
 
-/// Two bytes a pixel, in this machine's order. False where the file has anything else.
+/// Requests two bytes per pixel in host byte order. False if the file is not 16-bit grey.
 bool askForGrey16(png_structp png, png_infop info) {
   if (png_get_color_type(png, info) != PNG_COLOR_TYPE_GRAY || png_get_bit_depth(png, info) != 16)
     return false;
@@ -51,8 +51,8 @@ bool askForGrey16(png_structp png, png_infop info) {
   return true;
 }
 
-// libpng reports errors by longjmp: no object with a destructor may live in this function, and what it
-// changes after setjmp lives behind pointers.
+// libpng reports errors by longjmp: no object with a destructor may be in this function, and values changed
+// after setjmp must be behind pointers.
 DecodeResult readPng(png_structp png, png_infop info, PngInput* input, ImageSize expected, Grey grey,
                      std::uint8_t* out, ImageSize* found) {
   if (setjmp(png_jmpbuf(png)) != 0) return DecodeResult::kDamaged;

@@ -16,11 +16,11 @@ namespace swiftlet {
 
 class ImageDecoder {
  public:
-  /// Decodes into `out` of expected.width * expected.height bytes, rows packed. `found` gets the
-  /// picture's size as soon as its header was read; another size than expected gives kWrongSize.
+  /// Decodes into `out` of expected.width * expected.height bytes, rows without padding. `found` is set as
+  /// soon as the header was read; a size other than `expected` gives kWrongSize.
   DecodeResult decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
                       ImageSize& found);
-  /// PNG of 16 bits grey, kept as written (depth images); everything else is damaged.
+  /// 16-bit grey PNG, values unchanged (depth images); any other image is damaged.
   static DecodeResult decode16(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint16_t* out,
                                ImageSize& found);
 

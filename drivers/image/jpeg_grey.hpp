@@ -1,17 +1,16 @@
 #pragma once
-// JPEG to 8-bit grey: the luma plane, through libjpeg-turbo with its exact integer transform.
+// Decodes JPEG to 8-bit grey: the luma plane, with libjpeg-turbo's exact integer transform.
 //
-// Pictures of cameras, which leave out their Huffman tables, are taken: the codec has the usual ones.
-// Errors: values. A picture that ends early is damaged, even where the codec could fill in the rest.
-// Memory: the codec's own, some 100 KiB while it decodes: it allocates, so not for a thread of the flight
-// path. One decoder per thread.
+// Camera pictures without Huffman tables are accepted: the codec has the standard ones. Errors: values. A
+// truncated picture is damaged, even if the codec could fill in the rest. Memory: the codec's own, some 100
+// KiB while decoding. It allocates: not for a thread of the flight path. One decoder per thread.
 
 #include <cstdint>
 #include <span>
 
 namespace swiftlet {
 
-inline constexpr int kMaxImageSide = 16384;  // pixels; a larger one is damage, not a picture
+inline constexpr int kMaxImageSide = 16384;  // pixels; a larger size is damage
 
 enum class DecodeResult : std::uint8_t { kOk, kUnknownFormat, kDamaged, kWrongSize };
 
@@ -28,7 +27,7 @@ class JpegGrey {
   JpegGrey(const JpegGrey&) = delete;
   JpegGrey& operator=(const JpegGrey&) = delete;
 
-  /// Rows without padding into `out`. `found`: the picture's size, zeros where it has no header.
+  /// Writes rows without padding to `out`. `found`: the picture's size, zeros if it has no header.
   DecodeResult decode(std::span<const std::uint8_t> bytes, ImageSize expected, std::uint8_t* out,
                       ImageSize& found);
 

@@ -1,5 +1,5 @@
 #pragma once
-// The pixel formats that are taken, by V4L2's four letters. 8 bits of grey go on from all of them.
+// The supported pixel formats, by V4L2's four letters. All are converted to 8-bit grey.
 //
 // Source: linux/videodev2.h and Documentation/userspace-api/media/v4l of Linux 6.1.
 
@@ -10,36 +10,36 @@
 
 namespace swiftlet {
 
-/// Where a pixel's grey lies in a row.
+/// Position of a pixel's grey value in a row.
 enum class PixelLayout : std::uint8_t {
-  kBytes,      ///< a byte each; planes of chroma may follow the image
-  kWords,      ///< 16 bits each, little endian
-  kEvenBytes,  ///< luma, chroma
-  kOddBytes,   ///< chroma, luma
+  kBytes,      ///< one byte per pixel; chroma planes may follow the image
+  kWords,      ///< 16 bits per pixel, little endian
+  kEvenBytes,  ///< luma in even bytes, chroma in odd ones
+  kOddBytes,   ///< chroma in even bytes, luma in odd ones
   kPacked10,   ///< 4 pixels in 5 bytes: the upper 8 bits of each, then the lower 2 of all
   kPacked12,   ///< 2 pixels in 3 bytes: the upper 8 bits of each, then the lower 4 of both
-  kPairs,      ///< two bytes: the left camera's pixel, the right one's
-  kRgb,        ///< a byte each of red, green, blue
+  kPairs,      ///< two bytes: pixel of the left camera, pixel of the right camera
+  kRgb,        ///< one byte each of red, green, blue
   kBgr,
-  kRgbx,  ///< with a fourth byte that is not looked at
+  kRgbx,  ///< with a fourth byte that is ignored
   kBgrx,
   kJpeg,  ///< a compressed picture
 };
 
 struct PixelFormat {
-  std::array<char, 5> letters = {};  ///< blanks at the end included
+  std::array<char, 5> letters = {};  ///< including trailing blanks
   PixelLayout layout = PixelLayout::kBytes;
-  std::uint8_t bits = 8;  ///< of a word or packed pixel that are used
-  bool mosaic = false;    ///< of a sensor with colours behind a Bayer filter
+  std::uint8_t bits = 8;  ///< used bits of a word or packed pixel
+  bool mosaic = false;    ///< the sensor has a Bayer filter
 
   [[nodiscard]] constexpr std::string_view fourcc() const { return {letters.data(), 4}; }
   [[nodiscard]] constexpr bool operator==(const PixelFormat& other) const { return letters == other.letters; }
-  /// Of one row without padding. JPEG: 0.
+  /// Bytes of one row without padding. JPEG: 0.
   [[nodiscard]] constexpr int rowBytes(int width) const {
     switch (layout) {
       case PixelLayout::kBytes:
         return width;
-      case PixelLayout::kPacked10:  // whole groups: a lone pixel's low bits stand in the fifth byte
+      case PixelLayout::kPacked10:  // whole groups: the low bits of even one pixel are in the fifth byte
         return (width + 3) / 4 * 5;
       case PixelLayout::kPacked12:
         return (width + 1) / 2 * 3;
@@ -59,8 +59,8 @@ struct PixelFormat {
 
 inline constexpr PixelFormat kGrey8 = {{"GREY"}, PixelLayout::kBytes};
 
-/// In the order in which an undecided user is served: grey sensors first, then the least to carry and to
-/// convert; two cameras in one image and compressed pictures last.
+/// In order of preference: grey sensors first, then the least data and conversion; two cameras in one image
+/// and compressed images last.
 inline constexpr std::array kPixelFormats = {
     kGrey8,
     PixelFormat{{"Y10P"}, PixelLayout::kPacked10, 10},
@@ -116,7 +116,7 @@ inline constexpr std::array kPixelFormats = {
     PixelFormat{{"JPEG"}, PixelLayout::kJpeg},
 };
 
-/// Blanks at the end may be left out. Empty: no format that is taken (Z16, H264, ...).
+/// Trailing blanks may be omitted. Empty: an unsupported format (Z16, H264, ...).
 [[nodiscard]] std::optional<PixelFormat> pixelFormat(std::string_view fourcc);
 
 }  // namespace swiftlet

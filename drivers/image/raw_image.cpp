@@ -23,7 +23,7 @@ void everySecondByte(const std::uint8_t* in, int width, std::uint8_t* out) {
   for (int x = 0; x < width; ++x) out[x] = in[2 * x];
 }
 
-/// The bytes of a row but every (kGroup + 1)th, which has low bits.
+/// Copies the bytes of a row except every (kGroup + 1)th, which has the low bits.
 template <int kGroup>
 void packed(const std::uint8_t* row, int left, int width, std::uint8_t* out) {
   int x = left;
@@ -34,7 +34,7 @@ void packed(const std::uint8_t* row, int left, int width, std::uint8_t* out) {
   for (; x < end; ++x) *out++ = *in++;
 }
 
-/// Luma by ITU-R BT.601, in 14 bits, rounded half up. Pixels of kBytes bytes, red at kRed of them.
+/// Luma by ITU-R BT.601, in 14 bits, rounded half up. Pixels of kBytes bytes, red at byte kRed.
 template <int kBytes, int kRed>
 void colours(const std::uint8_t* in, int width, std::uint8_t* out) {
   constexpr unsigned kShift = 14;
@@ -90,7 +90,7 @@ void unpackRow(const RawImage& image, int y, unsigned shift, std::uint8_t* out) 
     case PixelLayout::kBgrx:
       colours<4, 2>(row + 4 * left, image.width, out);
       break;
-    case PixelLayout::kPairs:  // GreyReader takes them apart
+    case PixelLayout::kPairs:  // GreyReader separates them
     case PixelLayout::kJpeg:
       break;
   }

@@ -28,7 +28,7 @@ std::optional<PixelFormat> rosEncoding(std::string_view name, bool big_endian) {
   const auto* pair = std::ranges::find(kPairs, name, &Pair::name);
   if (pair == kPairs.end()) return std::nullopt;
   std::optional<PixelFormat> format = pixelFormat(pair->letters);
-  // All 16 bits are used, so the upper 8, which are wanted alone, are the first byte.
+  // All 16 bits are used, so the upper 8, the only ones needed, are the first byte.
   if (big_endian && format->layout == PixelLayout::kWords) format->layout = PixelLayout::kEvenBytes;
   return format;
 }

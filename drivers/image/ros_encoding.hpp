@@ -1,5 +1,5 @@
 #pragma once
-// The encodings of ROS's sensor_msgs/Image (sensor_msgs/image_encodings.hpp) as pixel formats.
+// Pixel formats of the encodings of ROS's sensor_msgs/Image (sensor_msgs/image_encodings.hpp).
 
 #include <optional>
 #include <string_view>
@@ -8,8 +8,8 @@
 
 namespace swiftlet {
 
-/// Empty: an encoding without grey in it, or that no camera of the tables in docs/ros2.md sends.
-/// `big_endian`: of pixels of 16 bits.
+/// Empty: an encoding without grey, or one that no camera listed in docs/ros2.md sends. `big_endian`: byte
+/// order of 16-bit pixels.
 [[nodiscard]] std::optional<PixelFormat> rosEncoding(std::string_view name, bool big_endian);
 
 }  // namespace swiftlet
