@@ -13,7 +13,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kBlock = 64U << 10U;  // bytes of the file that libarchive takes at once
+constexpr std::size_t kBlock = 64U << 10U;  // bytes that libarchive reads at a time
 
 bool isPicture(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
@@ -23,7 +23,7 @@ bool isPicture(const std::string& path) {
   return std::ranges::find(kPictures, extension) != kPictures.end();
 }
 
-/// "./mav0//imu0/data.csv" is "mav0/imu0/data.csv"; empty where it leads out of the root.
+/// Normalized path: "mav0/imu0/data.csv" for "./mav0//imu0/data.csv"; empty if it leads out of the root.
 std::string plainPath(const char* given) {
   if (given == nullptr) return {};
   std::string path = std::filesystem::path(given).lexically_normal().string();
@@ -42,7 +42,7 @@ const char* pathOf(archive_entry* entry) {
   return path != nullptr ? path : archive_entry_pathname_utf8(entry);
 }
 
-/// The data of the entry that `handle` is at; false: damaged or larger than any file of a log.
+/// Reads the current entry of `handle`; false: damaged, or larger than any file of a log.
 bool readData(archive* handle, std::vector<std::uint8_t>& bytes) {
   bytes.clear();
   std::array<std::uint8_t, kBlock> block;
@@ -91,7 +91,7 @@ ArchiveTree::Handle ArchiveTree::open() const {
 
 void ArchiveTree::add(const std::string& path, std::size_t number) {
   files_[path] = number;
-  // Archives need not name folders.
+  // Archives need not list their folders.
   for (std::string child = path; !child.empty();) {
     const std::string folder = folderOf(child);
     const std::size_t name = folder.empty() ? 0 : folder.size() + 1;

@@ -1,5 +1,5 @@
 #pragma once
-// file_tree.hpp's archives.
+// The archives of file_tree.hpp.
 
 #include <map>
 #include <set>
@@ -12,7 +12,7 @@ namespace swiftlet {
 
 class ArchiveTree final : public FileTree {
  public:
-  /// InputError: no archive, damaged, texts of more than kMostText.
+  /// InputError: not an archive, damaged, or more than kMostText of text.
   explicit ArchiveTree(const std::string& path);
 
   [[nodiscard]] bool isFile(const std::string& path) const override { return files_.contains(path); }
@@ -46,7 +46,7 @@ class ArchiveTree final : public FileTree {
   std::map<std::size_t, Bytes> texts_;
   std::map<std::size_t, Bytes> kept_;
   std::size_t kept_bytes_ = 0;
-  std::map<std::string, Reader> readers_;  ///< of folders
+  std::map<std::string, Reader> readers_;  ///< by folder
 };
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// The files of a log, in a folder or in an archive that is not unpacked.
+// Access to the files of a log, in a folder or in an archive that is not unpacked.
 //
 // Archives: zip, tar (also compressed by gzip, bzip2, xz, zstd or lz4), 7z and everything else that
 // libarchive recognizes by content. Opening reads through the archive once and keeps its texts (all files
@@ -36,9 +36,9 @@ class FileTree {
   /// Reads into `bytes`, whose memory is reused. False: missing, too large or damaged.
   [[nodiscard]] virtual bool read(const std::string& path, std::vector<std::uint8_t>& bytes) = 0;
 
-  /// As a text; InputError if it cannot be read.
+  /// The file as text; InputError if it cannot be read.
   [[nodiscard]] std::string text(const std::string& path);
-  /// For messages.
+  /// Path for messages.
   [[nodiscard]] std::string name(const std::string& path) const;
 
  protected:
@@ -52,7 +52,7 @@ class FileTree {
 [[nodiscard]] bool isArchive(const std::string& path);
 
 [[nodiscard]] std::shared_ptr<FileTree> openArchive(const std::string& path);
-/// "": where the program was called.
+/// "": the current directory.
 [[nodiscard]] std::shared_ptr<FileTree> openFolder(const std::string& path);
 
 }  // namespace swiftlet

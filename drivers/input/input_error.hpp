@@ -1,7 +1,7 @@
 #pragma once
-// Bad input, said so that a user can repair it: which file, line and field, what is wrong, what to
-// do. Thrown by the readers of files on the host side only; the program catches it once, prints
-// what() and ends with exit code 2. Nothing on the flight path throws or catches it.
+// Bad input, described so that the user can repair it: which file, line and field, what is wrong, what to do.
+// Thrown only by file readers on the host side; the program catches it once, prints what() and exits with
+// code 2. Nothing on the flight path throws or catches it.
 
 #include <exception>
 #include <string>
@@ -27,7 +27,7 @@ struct InputError : std::exception {
   [[nodiscard]] const char* what() const noexcept override { return text_.c_str(); }
 
   std::string file;
-  int line = 0;  ///< from 1; 0 when the fault belongs to the whole file
+  int line = 0;  ///< from 1; 0 if the fault belongs to the whole file
   std::string field;
   std::string message;
   std::string remedy;
@@ -36,13 +36,13 @@ struct InputError : std::exception {
   std::string text_;
 };
 
-/// What is only suspicious, a line each: "file:line: field: what".
+/// Suspicious but accepted values, a line each: "file:line: field: what".
 using Warnings = std::vector<std::string>;
 
 /// The location of a value, for errors and warnings about it.
 struct InputPlace {
   std::string file;
-  int line = 0;  ///< from 1; 0 when there are no lines
+  int line = 0;  ///< from 1; 0 if there are no lines
   std::string field;
 
   [[nodiscard]] InputError error(const std::string& message, const std::string& remedy) const {
