@@ -99,13 +99,14 @@ std::size_t AutopilotLink::tellPose(Stamp now, const NavState* state, const Eige
   if (!fresh) {
     if (newer) ++counters_.too_old;
     if (!lost_ || now - lost_since_ > kTellLoss) return 0;
-    // VISION_POSITION_ESTIMATE has no quality, and others than PX4 may not read it: silence says it.
+    // VISION_POSITION_ESTIMATE has no quality field, and only PX4 is known to read ODOMETRY's: otherwise send
+    // nothing.
     if (!px4_ || settings_.position_estimate) return 0;
     next_pose_ = now + period_;
     ++counters_.lost_poses;
     return writeLoss(now, out);
   }
-  // By the rate on the mean, and never two at once after a pause.
+  // Keeps the mean rate, but never sends two poses at once after a pause.
   next_pose_ = std::max(next_pose_ + period_, now + Duration{period_.ns / 2});
   if (any_ && (lost_ || state->epoch != epoch_)) ++resets_;
   any_ = true;
@@ -158,12 +159,12 @@ std::size_t AutopilotLink::tellText(std::span<std::uint8_t> out) {
   const std::string_view whole(text.text.data(), text.length);
   message.text = whole.substr(text.told, mavlink::StatusText::kMostText);
   if (text.length > mavlink::StatusText::kMostText) {
-    if (text.told == 0 && ++text_id_ == 0) ++text_id_;  // 0 is that of texts in one piece
+    if (text.told == 0 && ++text_id_ == 0) ++text_id_;  // 0 is used for texts in one piece
     message.id = text_id_;
     message.chunk = static_cast<std::uint8_t>(text.told / mavlink::StatusText::kMostText);
   }
   text.told += message.text.size();
-  // Readers of chunks go on until one is not full.
+  // Readers of chunks continue until one is not full.
   const bool more = message.id != 0 && message.text.size() == mavlink::StatusText::kMostText;
   const std::size_t length = mavlink::write(sender_, message, out);
   if (!more) texts_.erase(0);

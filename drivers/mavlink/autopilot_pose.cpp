@@ -13,13 +13,13 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Matrix6x15d = Eigen::Matrix<double, 6, kStateDim>;
 
 constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
-// Blocks of the state's error.
+// Positions of blocks in the state's error.
 constexpr int kPhi = 0;
 constexpr int kPosition = 3;
 constexpr int kVelocity = 6;
 constexpr int kBiasGyro = 9;
 
-/// z up to z down: the same on both sides of a rotation.
+/// Converts between z up and z down; for rotations it is applied on both sides.
 Vector3d toFrd(const Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
 
 mavlink::Covariance21 pack(const Matrix6d& flu) {
@@ -33,7 +33,7 @@ mavlink::Covariance21 pack(const Matrix6d& flu) {
   return packed;
 }
 
-/// Of position and world-turned angles by the state's error.
+/// Covariance of position and of rotation about the world's axes, from that of the error state.
 Matrix6d poseCovariance(const NavState& state, const Vector3d& lever) {
   const Matrix3d R = state.T_world_body.R();
   Matrix6x15d A = Matrix6x15d::Zero();
@@ -43,7 +43,8 @@ Matrix6d poseCovariance(const NavState& state, const Vector3d& lever) {
   return A * state.covariance * A.transpose();
 }
 
-/// Of the velocity in the vehicle's axes, and of its rates, which are off by the bias.
+/// Covariance of the velocity in the vehicle's axes and of its angular rates, whose error is that of the
+/// bias.
 Matrix6d velocityCovariance(const NavState& state, const Matrix3d& R_vehicle_body) {
   const Matrix3d R_body_world = state.T_world_body.R().transpose();
   Matrix6x15d A = Matrix6x15d::Zero();
@@ -105,7 +106,7 @@ mavlink::VisionPositionEstimate positionEstimateOf(const NavState& state, const 
 
 std::int8_t qualityOf(Health health) {
   constexpr std::int8_t kGood = 100;
-  // Above autopilots' usual thresholds, and visibly less.
+  // Above the usual thresholds of autopilots, and visibly lower than kGood.
   constexpr std::int8_t kDegraded = 40;
   switch (health) {
     case Health::kGood:

@@ -1,14 +1,14 @@
 #pragma once
-// From the estimator's state to what autopilots take: the vehicle's reference point instead of the IMU, and
-// forward-right-down axes instead of z up.
+// Converts the estimator's state to what autopilots expect: the vehicle's reference point instead of the IMU,
+// and forward-right-down axes instead of z up.
 //
-// Frames: `body` is the IMU as calibrated, `vehicle` its mounting: forward, left, up. The local frame sent is
-// the world turned to x, -y, -z: FRD, whose heading nobody referred to north. Velocity and rates are in the
-// vehicle's FRD axes.
+// Frames: `body` is the IMU as calibrated, `vehicle` its mounting: forward, left, up. The local frame that is
+// sent is the world rotated to x, -y, -z: FRD with a heading not referenced to north. Velocity and rates are
+// in the vehicle's FRD axes.
 //   p = p_W_B + R_W_B r            v = R_W_V^T (v_W_B + R_W_B (omega x r))        r: IMU to reference point
 //   M = diag(1, -1, -1) on both sides of every block
-// Covariances by first order: angles are the error phi turned to the world's axes (docs/mavlink.md).
-// Pure; no memory; about 2 us.
+// Covariances are first order; angles are the error phi rotated to the world's axes (docs/mavlink.md). Pure;
+// no memory; about 2 us.
 
 #include <Eigen/Geometry>
 
@@ -25,10 +25,10 @@ struct AutopilotMounting {
 /// `omega_body`: angular rate without bias [rad/s]. Stamp: the state's, in whole microseconds.
 mavlink::Odometry odometryOf(const NavState& state, const Eigen::Vector3d& omega_body,
                              const AutopilotMounting& mounting);
-/// The same for autopilots without ODOMETRY; angles are roll, pitch, yaw in FRD.
+/// The same for autopilots without ODOMETRY; angles are roll, pitch and yaw in FRD.
 mavlink::VisionPositionEstimate positionEstimateOf(const NavState& state, const AutopilotMounting& mounting);
 
-/// 1 to 100 as autopilots compare it with their threshold; 0 before there is a state, -1 where it failed.
+/// Quality for the autopilot's threshold: 1 to 100; 0 before the first state, -1 if the estimator failed.
 std::int8_t qualityOf(Health health);
 
 }  // namespace swiftlet

@@ -6,13 +6,13 @@
 namespace swiftlet {
 namespace {
 
-/// From a request until its effect is counted.
+/// Time after a request before samples are counted.
 constexpr Duration kSettling = Duration::fromMilliseconds(300);
 constexpr Duration kWindow = Duration::fromMilliseconds(1000);
 constexpr double kMore = 1.25;
 constexpr double kMost = 2;
 constexpr double kMicroseconds = 1e6;
-/// Seconds without a reading after which another message is tried.
+/// Seconds without a reading after which another message is requested.
 constexpr int kPatience = 3;
 
 struct Choice {
@@ -52,7 +52,7 @@ void ImuStreamRequest::begin() {
 
 std::optional<mavlink::CommandLong> ImuStreamRequest::step(Stamp now) {
   if (rate_ <= 0 || !system_ || now - heartbeat_ >= kGone) return std::nullopt;
-  if (now <= window_) count_ = 0;  // it settles
+  if (now <= window_) count_ = 0;  // still settling
   if (!ask_ && now - window_ >= kWindow) judge(now);
   if (!ask_) return std::nullopt;
   ask_ = false;
@@ -69,7 +69,7 @@ std::optional<mavlink::CommandLong> ImuStreamRequest::step(Stamp now) {
   return command;
 }
 
-/// Of the second that has passed.
+/// Judges the second that has passed.
 void ImuStreamRequest::judge(Stamp now) {
   seen_ = static_cast<double>(count_) / (now - window_).seconds();
   window_ = now;

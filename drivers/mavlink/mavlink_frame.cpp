@@ -40,7 +40,7 @@ MavlinkHeader readMavlinkHeader(std::span<const std::uint8_t> bytes) {
   if (bytes.empty() || (bytes[0] != kStart1 && bytes[0] != kStart2)) return header;
   header.verdict = MavlinkHeader::Verdict::kIncomplete;
   const bool first_version = bytes[0] == kStart1;
-  // The flags are looked at as soon as they are there: a stray start byte should not wait for a payload.
+  // Flags are checked as soon as they are received: a stray start byte should not wait for a payload.
   if (!first_version && bytes.size() > 2 && (bytes[2] & ~kSignedFlag) != 0) {
     header.verdict = MavlinkHeader::Verdict::kUnknownFlags;
     return header;
@@ -52,7 +52,7 @@ MavlinkHeader readMavlinkHeader(std::span<const std::uint8_t> bytes) {
   header.frame_length = header.payload_begin + header.payload_length + kChecksum;
   if (first_version) {
     header.message = bytes[5];
-    // Version 1 cuts nothing, so a wrong length shows at once and holds nothing back.
+    // Version 1 does not trim payloads, so a wrong length is detected at once.
     const auto known = knownMessage(header.message);
     if (known && (bytes[1] < known->shortest_v1 || bytes[1] > known->longest_v1))
       header.verdict = MavlinkHeader::Verdict::kNotHere;

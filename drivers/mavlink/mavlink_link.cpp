@@ -32,7 +32,7 @@ FrameCheck MavlinkLink::check(std::span<const std::uint8_t> bytes, StreamCounter
 FrameVerdict MavlinkLink::checkUnknown(std::span<const std::uint8_t> frame, const MavlinkHeader& header) {
   const std::uint16_t before = mavlinkChecksum(frame, header);
   const std::uint16_t carried = carriedChecksum(frame, header);
-  // The last CRC step takes any table entry once, so at most one value fits.
+  // The last CRC step maps the 256 values to different results, so at most one fits.
   for (unsigned value = 0; value < 256; ++value) {
     const auto crc_extra = static_cast<std::uint8_t>(value);
     if (crc16Mcrf4xx(before, {&crc_extra, 1}) != carried) continue;

@@ -2,13 +2,13 @@
 // State of a MAVLink receiver: CRC_EXTRA of unknown messages, and the sequence number of each sender.
 // MavlinkParser combines it with a buffer for readers of messages.
 //
-// A frame of an unknown message cannot be checked because its CRC_EXTRA is unknown. But one of 256 values
-// must make its checksum right: that value is stored, and from the second frame that needs the same value the
-// message counts as a frame of unknown kind. So sequence gaps are correct on links that carry any dialect,
-// and no byte is accepted without a checksum of 16 bits. The first frame of each such message counts as
-// skipped bytes.
+// A frame of an unknown message cannot be verified at first, because its CRC_EXTRA is unknown. But at most
+// one of the 256 values makes its checksum right. That value is stored, and from the second frame that needs
+// the same value the message counts as a frame of unknown kind. So sequence gaps are correct on links with
+// any dialect, and no byte is accepted without a checksum of 16 bits. The first frame of each such message
+// counts as skipped bytes.
 //
-// Memory: fixed, under 1 kB without the buffer. Cost: O(1) per frame; 256 CRC steps more for unknown
+// Memory: fixed, under 1 kB without the buffer. Cost: O(1) per frame; 256 more CRC steps for unknown
 // messages.
 
 #include <array>
@@ -26,9 +26,9 @@ class MavlinkLink {
  public:
   /// Whether a frame starts here. Called by a FrameBuffer once per position and result.
   FrameCheck check(std::span<const std::uint8_t> bytes, StreamCounters& counters);
-  /// Counts signatures and lost messages; for each whole frame, in order.
+  /// Counts signatures and lost messages; call for each complete frame, in order.
   void count(const MavlinkFrame& frame, StreamCounters& counters);
-  /// Forgets the senders' numbers, after the link was gone.
+  /// Forgets the senders' sequence numbers, for use after the link was lost.
   void forgetSenders() { source_count_ = 0; }
 
  private:
@@ -46,10 +46,10 @@ class MavlinkLink {
   bool hasLearned(std::uint32_t message, std::uint8_t crc_extra);
   FrameVerdict checkUnknown(std::span<const std::uint8_t> frame, const MavlinkHeader& header);
 
-  // An autopilot's default streams have some 40 messages.
+  // An autopilot's default streams have about 40 messages.
   std::array<Learned, 64> learned_ = {};
   std::size_t next_learned_ = 0;
-  // Autopilot, camera, gimbal, ground station and what they route; more are not followed.
+  // Autopilot, camera, gimbal, ground station and routed senders; further ones are not tracked.
   std::array<Source, 16> sources_ = {};
   std::size_t source_count_ = 0;
 };
@@ -58,13 +58,13 @@ class MavlinkParser {
  public:
   static constexpr std::size_t kMostFed = FrameBuffer<kLongestMavlinkFrame>::kMostFed;
 
-  /// As FrameBuffer::feed.
+  /// See FrameBuffer::feed().
   [[nodiscard]] std::size_t feed(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time) {
     return buffer_.feed(bytes, read_at, byte_time, counters_);
   }
-  /// The next frame with the right checksum, of any message; false: feed more.
+  /// The next frame with a valid checksum, of any message; false: more bytes are needed.
   bool next(MavlinkFrame& frame);
-  /// After the link was gone: forgets half a frame and the senders' numbers, keeps the counters.
+  /// After the link was lost: drops a partial frame and the senders' sequence numbers, keeps the counters.
   void restart();
   [[nodiscard]] const StreamCounters& counters() const { return counters_; }
   [[nodiscard]] std::size_t waiting() const { return buffer_.waiting(); }

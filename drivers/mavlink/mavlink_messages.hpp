@@ -1,10 +1,9 @@
 #pragma once
 // The MAVLink messages that swiftlet reads or writes, field for field, in MAVLink's own units.
 //
-// read(frame, message): false when the frame holds another message. Fields that were not sent (trailing
-// zeros, extensions of version 1) are zero.
-// write(sender, message, out): one version 2 frame; its length, or 0 when `out` is too short.
-// Offsets and units: docs/mavlink.md. Source: MAVLink common.xml.
+// read(frame, message): false if the frame holds another message. Fields that were not sent (trailing zeros,
+// extensions of version 1) are zero. write(sender, message, out): one version 2 frame; returns its length, or
+// 0 if `out` is too short. Offsets and units: docs/mavlink.md. Source: MAVLink common.xml.
 
 #include <Eigen/Core>
 
@@ -17,13 +16,13 @@
 
 namespace swiftlet::mavlink {
 
-/// HIGHRES_IMU: forward-right-down axes; at rest level z is about -9.81.
+/// HIGHRES_IMU: forward-right-down axes; at rest and level z is about -9.81.
 struct HighresImu {
   static constexpr std::uint32_t kId = 105;
   static constexpr std::uint16_t kAccelUpdated = 0x07;  ///< bits of fields_updated
   static constexpr std::uint16_t kGyroUpdated = 0x38;
 
-  std::uint64_t time_usec = 0;                      ///< [us] since boot or, of some senders, since 1970
+  std::uint64_t time_usec = 0;                      ///< [us] since boot or, from some senders, since 1970
   Eigen::Vector3f accel = Eigen::Vector3f::Zero();  ///< [m/s^2]
   Eigen::Vector3f gyro = Eigen::Vector3f::Zero();   ///< [rad/s]
   Eigen::Vector3f mag = Eigen::Vector3f::Zero();    ///< [gauss]
@@ -32,25 +31,25 @@ struct HighresImu {
   float pressure_alt = 0;                           ///< [m]
   float temperature = 0;                            ///< [degC]
   std::uint16_t fields_updated = 0;
-  std::uint8_t id = 0;  ///< which of the sender's sensors; extension
+  std::uint8_t id = 0;  ///< number of the sender's sensor; extension
 };
 
-/// SCALED_IMU and RAW_IMU, of sensor 0, as ArduPilot means both: thousandths, forward-right-down axes.
+/// SCALED_IMU and RAW_IMU of sensor 0 in ArduPilot's units: thousandths, forward-right-down axes.
 struct ScaledImu {
   static constexpr std::uint32_t kScaledId = 26;
   static constexpr std::uint32_t kRawId = 27;
-  static constexpr double kMetresPerSecond2 = 9.80665e-3;  ///< of a unit of `accel`
-  static constexpr double kRadPerSecond = 1e-3;            ///< of a unit of `gyro`
+  static constexpr double kMetresPerSecond2 = 9.80665e-3;  ///< per unit of `accel`
+  static constexpr double kRadPerSecond = 1e-3;            ///< per unit of `gyro`
   using Vector = Eigen::Matrix<std::int16_t, 3, 1>;
 
   std::uint64_t time_usec = 0;    ///< [us]; SCALED_IMU has whole milliseconds
   Vector accel = Vector::Zero();  ///< [mg]
   Vector gyro = Vector::Zero();   ///< [mrad/s]
-  std::uint8_t id = 0;            ///< of RAW_IMU; extension
+  std::uint8_t id = 0;            ///< RAW_IMU only; extension
 };
 
-/// TIMESYNC: a request has tc1 = 0 and its sender's clock in ts1; the answer mirrors ts1 and puts the
-/// answerer's clock into tc1.
+/// TIMESYNC: a request has tc1 = 0 and its sender's clock in ts1. The answer repeats ts1 and has the
+/// answerer's clock in tc1.
 struct Timesync {
   static constexpr std::uint32_t kId = 111;
   std::int64_t tc1 = 0;               ///< [ns]
@@ -73,7 +72,7 @@ struct Heartbeat {
 
 struct CommandLong {
   static constexpr std::uint32_t kId = 76;
-  /// MAV_CMD_SET_MESSAGE_INTERVAL: parameter 0 the message, parameter 1 the interval [us].
+  /// MAV_CMD_SET_MESSAGE_INTERVAL: param[0] is the message, param[1] the interval [us].
   static constexpr std::uint16_t kSetMessageInterval = 511;
   std::array<float, 7> param = {};
   std::uint16_t command = 0;
@@ -82,7 +81,7 @@ struct CommandLong {
   std::uint8_t confirmation = 0;
 };
 
-/// The first three bytes of COMMAND_ACK: which command, and 0 = accepted.
+/// The first three bytes of COMMAND_ACK: command and result (0 = accepted).
 struct CommandAck {
   static constexpr std::uint32_t kId = 77;
   static constexpr std::uint8_t kAccepted = 0;    ///< MAV_RESULT_ACCEPTED

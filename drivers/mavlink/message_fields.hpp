@@ -1,5 +1,5 @@
 #pragma once
-// What the writers and readers of messages have in common. Private to this folder.
+// Shared by the readers and writers of messages. Private to this folder.
 
 #include <array>
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace swiftlet::mavlink {
 
 inline LittleFieldReader reader(const MavlinkFrame& frame) { return LittleFieldReader(frame.payload); }
 
-/// Buffer for the longest payload; `finish` sends the content.
+/// Buffer for the longest payload; finish() writes the frame.
 class Payload {
  public:
   std::size_t finish(MavlinkSender& sender, std::uint32_t message, std::span<std::uint8_t> out) {

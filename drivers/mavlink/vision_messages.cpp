@@ -113,7 +113,7 @@ std::size_t write(MavlinkSender& sender, const ObstacleDistance& message, std::s
   to.u16(message.min_cm);
   to.u16(message.max_cm);
   to.u8(message.sensor);
-  // Receivers of the first version of the message know whole degrees only.
+  // Receivers of the message's first version read only whole degrees.
   to.u8(static_cast<std::uint8_t>(std::lround(message.increment_deg)));
   to.f32(message.increment_deg);
   to.f32(message.offset_deg);
