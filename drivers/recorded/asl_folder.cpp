@@ -18,9 +18,9 @@
 namespace swiftlet {
 namespace {
 
-// Numbers of pictures; a stamp in ns is above a second.
+// Numbers in image names; larger ones are stamps in ns (any time after the first 0.1 s).
 constexpr std::int64_t kLargestNumber = 100'000'000;
-constexpr int kAround = 2;  // folders that archives put around a log, at most
+constexpr int kAround = 2;  // largest number of folders that archives put around a log
 
 std::string joined(const std::string& folder, const std::string& name) {
   return folder.empty() ? name : folder + "/" + name;
@@ -31,7 +31,7 @@ std::string parentOf(const std::string& folder) {
   return slash == std::string::npos ? std::string() : folder.substr(0, slash);
 }
 
-/// The folders that hold imu0 or cam0: `folder` or mav0 in it, else those within, `depth` levels down.
+/// Finds the folders that hold imu0 or cam0: `folder` or its mav0, else those up to `depth` levels below.
 void findIn(const FileTree& tree, const std::string& folder, int depth, std::vector<std::string>& found) {
   for (const std::string& place : {joined(folder, "mav0"), folder}) {
     if (!tree.isFolder(joined(place, "imu0")) && !tree.isFolder(joined(place, "cam0"))) continue;
@@ -77,7 +77,7 @@ class AslFolder final : public RecordedLog {
   std::array<std::vector<std::string>, kMaxCameras> files_;  ///< relative to camN
   std::vector<std::uint8_t> bytes_;
   ImageDecoder decoder_;
-  std::string truth_;  ///< in folder_; empty: none
+  std::string truth_;  ///< relative to folder_; empty: none
   std::string track_file_;
 };
 
@@ -110,7 +110,7 @@ void AslFolder::readCalibrationFiles() {
   } else if (hasFile("cam0/sensor.yaml")) {
     calibration_ = readCalibration(*log_.tree, log_.folder, options_.imu_calibration, how);
   } else {
-    // Kalibr's files beside the data: TUM-VI keeps them in dso/.
+    // Kalibr's files may lie beside the data; TUM-VI keeps them in dso/.
     const std::string above = parentOf(log_.folder);
     for (const std::string& place : {above, log_.folder, joined(above, "dso"), joined(log_.folder, "dso")}) {
       if (!hasCalibration(*log_.tree, place)) continue;
@@ -123,7 +123,7 @@ void AslFolder::readCalibrationFiles() {
           "Give a log with a calibration: EuRoC sensor.yaml, or pass Kalibr's camchain and IMU YAML");
     }
   }
-  // Tracks need no folder for the second camera: they say themselves what it saw.
+  // Track files need no folder for the second camera: they name the camera of each sighting.
   const bool images = !options_.without_images && track_file_.empty();
   const bool no_second = images && !hasFolder("cam1");
   if (calibration_.rig.camera_count > 1 && (options_.mono || no_second)) {
@@ -150,7 +150,7 @@ void AslFolder::readCameras() {
   }
 }
 
-/// Finds the file of a row; the name may be missing, or without its extension.
+/// Finds the file of a row, whose name may be missing or lack its extension.
 bool AslFolder::locate(std::uint32_t camera, ImageRow& row) const {
   const std::string folder = fmt::format("cam{}", camera);
   const std::string stem = row.file.empty() ? std::to_string(row.stamp.ns) : row.file;
@@ -169,7 +169,7 @@ bool AslFolder::locate(std::uint32_t camera, ImageRow& row) const {
   return false;
 }
 
-/// The number at the end of a picture's name: 12 of frame_000012.jpg.
+/// The number at the end of a file name: 12 for frame_000012.jpg.
 std::optional<std::int64_t> numberOf(const std::string& file) {
   const std::string stem = file.substr(0, file.rfind('.'));
   std::size_t begin = stem.size();
@@ -194,7 +194,7 @@ std::vector<ImageRow> AslFolder::listImages(std::uint32_t camera) {
     }
   }
   std::vector<ImageRow>& rows = stamped.empty() ? numbered : stamped;
-  // A directory has no order of its own, so sorting it is not worth a warning.
+  // A directory listing has no order, so sorting it needs no warning.
   std::ranges::sort(rows, {}, &ImageRow::stamp);
   orderByStamp(rows, name(folder + "/data"), counters_, warnings_);
   if (stamped.empty()) {
@@ -205,8 +205,8 @@ std::vector<ImageRow> AslFolder::listImages(std::uint32_t camera) {
   return rows;
 }
 
-/// Pictures with numbers for names, as frame grabbers write them, have no stamps: the calibration's rate
-/// gives them, from the first sample on.
+/// Numbered images, as frame grabbers write them, have no stamps: they are stamped at the calibration's rate,
+/// starting at the first IMU sample.
 void AslFolder::stampNumbered(std::uint32_t camera, std::vector<ImageRow>& rows) {
   if (rows.empty()) return;
   if (options_.uncalibrated) {
@@ -259,7 +259,7 @@ RecordedLog::Fetched AslFolder::fetch(const ImageEntry& entry, ImageSize expecte
   return fetched;
 }
 
-/// Nanoseconds of [first, last] image that the truth covers.
+/// Nanoseconds between the first and the last image that the truth covers.
 std::int64_t coverage(const Trajectory& truth, Stamp first, Stamp last) {
   if (truth.empty()) return 0;
   const std::int64_t overlap = (std::min(truth.back().stamp, last) - std::max(truth.front().stamp, first)).ns;
@@ -267,7 +267,7 @@ std::int64_t coverage(const Trajectory& truth, Stamp first, Stamp last) {
 }
 
 void AslFolder::chooseTruth() {
-  // A truth that is better known comes first and wins a tie.
+  // In order of preference: the first one wins if two cover the same time.
   std::vector<std::string> candidates;
   for (const std::string place : {"state_groundtruth_openvins", "state_groundtruth_estimate0", "mocap0"}) {
     if (hasFile(place + "/data.csv")) candidates.push_back(place + "/data.csv");
@@ -297,7 +297,7 @@ Trajectory AslFolder::groundTruth(LogWarnings& warnings) const {
   LogCounters counters;
   Trajectory truth = readTrajectoryText(groundTruthName(), text(truth_), counters, warnings);
   const SE3 T_filebody_body = calibration_.T_body_filebody.inverse();
-  // The velocity of another point of the body would need the true rate, which the file does not have.
+  // The velocity of another point of the body would need the true angular rate, which the file does not have.
   const bool moved = T_filebody_body.translation.norm() > 0;
   for (TrajectoryPoint& point : truth) {
     point.T_world_body = point.T_world_body * T_filebody_body;

@@ -53,7 +53,7 @@ std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T
 
 std::string imuMatricesYaml(const Calibration& calibration) {
   if (!calibration.hasImuMatrices()) return {};
-  // Kalibr's gyro matrix is a lower triangle after a rotation: the transposed QR decomposition.
+  // Kalibr's gyro matrix is a lower triangular matrix times a rotation: QR decomposition of the transpose.
   const Eigen::HouseholderQR<Eigen::Matrix3d> qr(calibration.gyro_matrix.transpose());
   Eigen::Matrix3d lower = Eigen::Matrix3d(qr.matrixQR().triangularView<Eigen::Upper>()).transpose();
   Eigen::Matrix3d C_gyro_i = Eigen::Matrix3d(qr.householderQ()).transpose();

@@ -1,5 +1,5 @@
 #pragma once
-// The text files of an EuRoC/ASL folder, for who writes one: sensor.yaml, and data.csv of an IMU.
+// Text of the files of an EuRoC/ASL folder, for writers: sensor.yaml, and data.csv of an IMU.
 
 #include <string>
 #include <string_view>
@@ -18,12 +18,12 @@ std::string cameraYaml(const CameraModel& camera, const SE3& T_body_cam, double 
                        std::string_view origin, const std::string& extra);
 /// Lines of a camera's sensor.yaml for a rolling shutter; empty for a global one.
 std::string shutterYaml(Duration readout);
-/// `extra` lines go at its end.
+/// sensor.yaml of an IMU; `extra` lines are appended.
 std::string imuYaml(const ImuNoise& noise, std::string_view origin, const SE3& T_body_imu = SE3(),
                     const std::string& extra = {});
-/// Scale and misalignment in the words of Kalibr's IMU files, for its and for EuRoC's; empty without any.
+/// Scale and misalignment under Kalibr's keys, for IMU files of Kalibr and EuRoC; empty if there are none.
 std::string imuMatricesYaml(const Calibration& calibration);
-/// data.csv of an IMU: its first line, and a line for each sample, both with their ends.
+/// data.csv of an IMU: its header line, and the line of a sample, both with line ends.
 std::string imuCsvHeader();
 std::string imuCsvRow(const ImuSample& sample);
 

@@ -39,7 +39,7 @@ class BagLog final : public RecordedLog {
   void addImu(const BagEntry& entry, std::vector<ImuSample>& samples);
   void addImage(std::size_t camera, std::size_t entry);
   void joinTopics();
-  /// In range, and not zero: then the receive time takes its place.
+  /// Checks the range; a stamp of zero is replaced by the receive time.
   void checkStamp(const BagEntry& entry, Stamp& stamp);
   void countShort(const BagEntry& entry);
   [[nodiscard]] const BagTopic& topic(std::uint32_t index) const { return bag_->topics()[index]; }
@@ -49,7 +49,7 @@ class BagLog final : public RecordedLog {
   std::array<std::optional<std::uint32_t>, kMaxCameras> camera_;
   std::optional<std::uint32_t> truth_;
   std::array<std::vector<std::size_t>, kMaxCameras> pictures_;  ///< entries of the bag
-  std::vector<ImuSample> accel_;                                ///< where it has a topic of its own
+  std::vector<ImuSample> accel_;                                ///< if the accelerometer has its own topic
   std::uint64_t zero_stamps_ = 0;
   std::span<const std::uint8_t> picture_;
   ImageDecoder decoder_;

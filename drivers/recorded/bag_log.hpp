@@ -1,5 +1,5 @@
 #pragma once
-// A log from a bag of any kind (drivers/bag): rosbag2, MCAP, ROS 1.
+// A log in a bag of any kind (drivers/bag): rosbag2, MCAP, ROS 1.
 //
 // Streams are found by type: sensor_msgs/Imu, Image, CompressedImage. If the calibration names topics, those
 // are used; otherwise the IMU topic with the most messages, and the first image topics by name whose images

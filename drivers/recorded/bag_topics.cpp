@@ -15,7 +15,8 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kProbed = 50;  // messages of an IMU topic; a sensor that lives is not zero for so long
+constexpr std::size_t kProbed = 50;  // messages per IMU topic; a working sensor is not exactly zero for so
+                                     // long
 
 bool isRead(const BagTopic& topic) { return topic.messages > 0 && topic.encoding != BagEncoding::kOther; }
 
@@ -47,7 +48,7 @@ std::map<std::uint32_t, Halves> probeImu(BagFile& bag) {
   return halves;
 }
 
-/// The busiest topic with these halves, or the one that is wanted.
+/// The `wanted` topic if it has these parts, else the topic with the most messages that has them.
 std::optional<std::uint32_t> busiest(const BagFile& bag, const std::map<std::uint32_t, Halves>& halves,
                                      const std::string& wanted, bool gyro, bool accel) {
   std::optional<std::uint32_t> best;
@@ -60,7 +61,7 @@ std::optional<std::uint32_t> busiest(const BagFile& bag, const std::map<std::uin
   return best;
 }
 
-/// Of the first picture on a topic; {0, 0} for a compressed one.
+/// Size of the first image on a topic; {0, 0} for a compressed one.
 ImageSize sizeOn(BagFile& bag, std::uint32_t topic) {
   rosmsg::Image image;
   if (bag.topics()[topic].type != rosmsg::Image::kType) return {};
@@ -72,8 +73,7 @@ ImageSize sizeOn(BagFile& bag, std::uint32_t topic) {
   return {static_cast<int>(image.width), static_cast<int>(image.height)};
 }
 
-/// Pictures in the order of their topics' names, without depth, and without those that another topic holds
-/// raw.
+/// Image topics sorted by name, without depth images and without compressed copies of raw topics.
 std::vector<std::uint32_t> imageTopics(const BagFile& bag) {
   constexpr std::string_view kTail = "/compressed";
   std::vector<std::uint32_t> found;
@@ -105,7 +105,7 @@ std::optional<std::uint32_t> namedImages(const BagFile& bag, const std::string& 
   return std::nullopt;
 }
 
-/// Body of a message that holds a pose, as a point of a trajectory.
+/// Reads a message that holds a pose as a point of a trajectory.
 bool readPose(const BagTopic& topic, std::span<const std::uint8_t> body, TrajectoryPoint& point) {
   const auto take = [&point](const rosmsg::Header& header, const auto& p, const rosmsg::Quaternion& q) {
     const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
@@ -113,7 +113,7 @@ bool readPose(const BagTopic& topic, std::span<const std::uint8_t> body, Traject
     if (!(std::abs(rotation.norm() - 1) <= kFarFromUnit)) return false;
     point.stamp = header.stamp;
     point.T_world_body = SE3(rotation, Eigen::Vector3d(p.x, p.y, p.z));
-    // One that is of unit norm already keeps its last bits: a bag of a bag is the same bag.
+    // Do not renormalize a unit quaternion: re-exporting a bag must not change its last bits.
     constexpr double kOfUnitNorm = 1e-14;
     if (std::abs(rotation.norm() - 1) < kOfUnitNorm) point.T_world_body.rotation = rotation;
     return point.T_world_body.translation.allFinite();
@@ -151,7 +151,7 @@ BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted, LogWarning
   if (!silent) {
     throw InputError(bag.path(), 0, "", "no topic of type sensor_msgs/Imu", "Also record the IMU");
   }
-  // A simulator at rest gives such rates too.
+  // A simulator at rest also sends zero rates.
   warnings.add(
       fmt::format("{}: {}: the first {} angular rates are exactly zero: is the gyroscope's topic missing?",
                   bag.path(), bag.topics()[*silent].name, halves.at(*silent).probed));
@@ -165,7 +165,8 @@ std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(BagFile&
   std::array<std::optional<std::uint32_t>, kMaxCameras> chosen;
   for (std::size_t c = 0; c < cameras; ++c) chosen[c] = namedImages(bag, calibration.camera_topic[c]);
   const std::vector<std::uint32_t> images = imageTopics(bag);
-  // Those of the right size first; a wrong size is better refused with both sizes than not found.
+  // First topics with the right size; then any size for camera 0, since an error that names both sizes helps
+  // more than "not found".
   bool guessed = false;
   for (const bool fitting : {true, false}) {
     for (std::size_t c = 0; c < cameras; ++c) {

@@ -1,5 +1,5 @@
 #pragma once
-// Which topics of a bag are the IMU, the cameras and the truth.
+// Selects the topics of a bag for IMU, cameras and truth.
 
 #include <array>
 #include <cstdint>
@@ -15,14 +15,14 @@ namespace swiftlet {
 
 struct BagImuTopics {
   std::uint32_t gyro = 0;
-  std::optional<std::uint32_t> accel;  ///< where the accelerometer has a topic of its own
+  std::optional<std::uint32_t> accel;  ///< if the accelerometer has its own topic
 };
 
 /// `wanted`: the calibration's topic name, empty for none. A topic whose accelerations are all exactly zero
-/// is a gyroscope only, and the other way round. InputError if there is none.
+/// is only a gyroscope, one with zero rates only an accelerometer. InputError if there is none.
 [[nodiscard]] BagImuTopics chooseImuTopics(BagFile& bag, const std::string& wanted, LogWarnings& warnings);
 
-/// One for each camera of the calibration, fewer where the bag has fewer; InputError if it has none.
+/// One topic per camera of the calibration, fewer if the bag has fewer; InputError if it has none.
 [[nodiscard]] std::array<std::optional<std::uint32_t>, kMaxCameras> chooseImageTopics(
     BagFile& bag, const Calibration& calibration, LogWarnings& warnings);
 
@@ -30,7 +30,7 @@ struct BagImuTopics {
 /// its name.
 [[nodiscard]] std::optional<std::uint32_t> chooseTruthTopic(const BagFile& bag);
 
-/// Poses in time order; those that are no poses are left out, which `warnings` says.
+/// Poses in time order. Invalid poses are skipped with a warning.
 [[nodiscard]] Trajectory readBagTruth(BagFile& bag, std::optional<std::uint32_t> topic,
                                       LogWarnings& warnings);
 

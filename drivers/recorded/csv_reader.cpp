@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-// A few bad rows are damage; more than this share is another format.
+// A few bad rows are damage; more than this number and share mean another format.
 constexpr std::uint64_t kToleratedBadRows = 3;
 constexpr std::uint64_t kToleratedBadShare = 10;  // one in ten
 constexpr std::size_t kMaxQuoted = 40;            // characters of bad input repeated in a message

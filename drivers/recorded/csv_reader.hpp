@@ -1,12 +1,11 @@
 #pragma once
-// Rows of a comma- or blank-separated text file, one at a time, in constant memory.
+// Reads the rows of a comma- or blank-separated text file, one at a time, in constant memory.
 //
 // Blank lines, lines that start with '#', and a first line whose first field is not a number (a header
 // without '#') are skipped. CR, surrounding blanks and a byte order mark of UTF-8 are removed; UTF-16 is an
-// InputError. A caller that cannot
-// use a row rejects it: the row is counted and named, and reading continues. finish() throws an InputError
-// that names the first bad row if more than a tenth of the rows (and more than three) are rejected, or if no
-// row is valid.
+// InputError. A caller that cannot use a row rejects it: the row is counted, the first one is remembered for
+// the message, and reading continues. finish() throws an InputError that names the first bad row if more than
+// a tenth of the rows (and more than three) are rejected, or if no row is valid.
 
 #include <array>
 #include <cstdint>
@@ -22,21 +21,21 @@
 
 namespace swiftlet {
 
-/// Input as a message repeats it: in quotes, cut to 40 characters, unprintable ones replaced.
+/// Input text for messages: in quotes, cut to 40 characters, with unprintable ones replaced.
 std::string quoteInput(std::string_view text);
 
 class CsvReader {
  public:
   static constexpr std::size_t kMaxFields = 64;
-  static constexpr std::size_t kMaxLine = 4096;  ///< bytes; far above any format here
+  static constexpr std::size_t kMaxLine = 4096;  ///< bytes; far above any format read here
 
   enum class Separator { kComma, kBlank };
 
-  /// kComma where the first line of data has a comma.
+  /// kComma if the first line of data has a comma.
   static Separator separatorOf(const std::string& path);
   static Separator separatorOfText(std::string_view text);
 
-  /// Opens `path`; InputError when that is impossible.
+  /// Opens `path`; InputError if that fails.
   CsvReader(const std::string& path, Separator separator, LogCounters& counters, LogWarnings& warnings);
   /// Reads text in memory, which must outlive the reader. `name` names the file in messages.
   CsvReader(const std::string& name, std::string_view text, Separator separator, LogCounters& counters,
@@ -48,17 +47,17 @@ class CsvReader {
   [[nodiscard]] std::string_view field(std::size_t i) const {
     return i < size_ ? fields_[i] : std::string_view{};
   }
-  /// The field as a finite number. On NaN the row is counted as such, on text it is rejected (the
-  /// field named `name`), and the answer is false.
+  /// The field as a finite number. False: the row is counted as NaN, or, if the field is not a number,
+  /// rejected with the field's `name`.
   bool number(std::size_t i, const char* name, double& value);
   bool numbers(std::size_t first, std::span<const char* const> names, double* values);
-  /// The field as a decimal integer; other text is rejected.
+  /// The field as a decimal integer; otherwise false, and the row is rejected.
   bool integer(std::size_t i, const char* name, std::int64_t& value);
   void reject(const char* field_name, const std::string& message);
-  /// The first row rejected or counted as NaN, for a caller that tolerates none.
+  /// The first row that was rejected or counted as NaN, for callers that tolerate none.
   [[nodiscard]] const std::optional<InputError>& firstBad() const { return first_bad_; }
 
-  /// Call when next() has given the last row.
+  /// Call after next() has returned false.
   void finish(const char* what, const char* remedy) const;
 
   [[nodiscard]] const std::string& name() const { return name_; }

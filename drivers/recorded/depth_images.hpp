@@ -1,8 +1,8 @@
 #pragma once
 // The depth images of a log: `mav0/depth0`, a folder like a camera's with data.csv, 16-bit grey PNG and a
-// sensor.yaml (drivers/calibration/depth_sensor.hpp). Not every image has one.
+// sensor.yaml (drivers/calibration/depth_sensor.hpp). Some frames may have none.
 //
-// Host side: opening allocates and throws InputError; at() decodes into one buffer, valid until the next
+// Host side: opening allocates and throws InputError. at() decodes into one buffer, valid until the next
 // call.
 
 #include <string>
@@ -19,8 +19,8 @@ namespace swiftlet {
 
 class DepthImages {
  public:
-  /// `log`: the sequence, its mav0 or an archive. A log without depth images gives none at any stamp.
-  /// `T_body_filebody`: of the log's calibration, where the IMU is not the file's body.
+  /// `log`: the sequence, its mav0 or an archive; if it has no depth images, at() never returns one.
+  /// `T_body_filebody`: from the log's calibration, if the IMU is not the file's body.
   DepthImages(const std::string& log, LogWarnings& warnings, const SE3& T_body_filebody = {});
 
   /// The image with exactly this stamp, in metres; `depth` is null if there is none. Missing, damaged or

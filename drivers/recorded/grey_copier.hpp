@@ -1,5 +1,6 @@
 #pragma once
-// Raw pixels of ROS's Image messages to 8-bit grey, rows packed, of all encodings that rosEncoding() knows.
+// Converts raw pixels of ROS Image messages to 8-bit grey without row padding, for all encodings that
+// rosEncoding() knows.
 
 #include <cstdint>
 
@@ -11,12 +12,12 @@ namespace swiftlet {
 
 class GreyCopier {
  public:
-  /// kUnknownFormat for other encodings, kDamaged when the data are too short. `found`: the image's size.
+  /// kUnknownFormat for other encodings, kDamaged if the data are too short. `found`: the image's size.
   DecodeResult copy(const rosmsg::Image& image, ImageSize expected, std::uint8_t* out, ImageSize& found);
 
  private:
   GreyReader reader_;
-  PixelFormat format_;  ///< what reader_ has memory for, with size_
+  PixelFormat format_;  ///< format that reader_ has memory for, at this size_
   ImageSize size_;
 };
 

@@ -12,7 +12,7 @@
 namespace swiftlet {
 namespace {
 
-// Camera noise does not compress: a low level costs a fifth of the time for 2 % more bytes.
+// Camera noise does not compress: a low level takes a fifth of the time for 2 % more bytes.
 constexpr int kPngLevel = 2;
 
 struct FileCloser {
@@ -38,8 +38,8 @@ void writeAll(const std::string& path, const std::uint8_t* data, std::size_t siz
   }
 }
 
-// False when libpng reports an error, which it does by a jump back to here: nothing with a
-// destructor may be made between.
+// False if libpng reports an error, which it does by longjmp to this setjmp: no object with a destructor may
+// be created in this function.
 bool encodePng(png_structp png, png_infop info, const std::uint8_t* rows, std::ptrdiff_t stride, int width,
                int height, int depth, int colour) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;

@@ -1,6 +1,6 @@
 #pragma once
-// Writes grey images: 8 and 16 bit PNG (libpng), 8 bit JPEG (libjpeg-turbo); and 8 bit PNG in colours. Throws
-// std::runtime_error naming the file.
+// Writes grey images as 8 and 16 bit PNG (libpng) and 8 bit JPEG (libjpeg-turbo), and colour images as 8 bit
+// PNG. Throws std::runtime_error naming the file.
 
 #include <cstdint>
 #include <string>
@@ -10,9 +10,9 @@ namespace swiftlet {
 
 void writePng8(const std::string& path, const std::uint8_t* grey, int width, int height);
 void writePng16(const std::string& path, const std::uint16_t* grey, int width, int height);
-/// `rgb`: red, green, blue of each pixel.
+/// `rgb`: red, green and blue bytes of each pixel.
 void writePngRgb8(const std::string& path, const std::uint8_t* rgb, int width, int height);
-/// A JPEG file's bytes; the same for the same pixels. std::runtime_error where there is no memory.
+/// The bytes of a JPEG file; the same pixels give the same bytes. std::runtime_error if memory is exhausted.
 std::vector<std::uint8_t> encodeJpeg(const std::uint8_t* grey, int width, int height, int quality);
 void writeJpeg(const std::string& path, const std::uint8_t* grey, int width, int height, int quality);
 

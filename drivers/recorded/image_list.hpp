@@ -1,6 +1,6 @@
 #pragma once
-// EuRoC/ASL camN/data.csv: `stamp [ns], file name`. The name need not be the stamp; where it is
-// missing, <stamp>.png and <stamp>.jpg are tried by the caller.
+// Reads EuRoC/ASL camN/data.csv: `stamp [ns], file name`. The name need not match the stamp; if it is
+// missing, the caller tries <stamp>.png and <stamp>.jpg.
 
 #include <string>
 #include <string_view>
@@ -13,7 +13,7 @@ namespace swiftlet {
 
 struct ImageRow {
   Stamp stamp;
-  std::string file;  ///< as written; empty when the row has no second field
+  std::string file;  ///< as written; empty if the row has no second field
 };
 
 std::vector<ImageRow> readImageList(const std::string& path, LogCounters& counters, LogWarnings& warnings);

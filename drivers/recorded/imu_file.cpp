@@ -19,13 +19,13 @@ namespace {
 constexpr std::array<const char*, 3> kGyroNames = {"gyro x", "gyro y", "gyro z"};
 constexpr std::array<const char*, 3> kAccelNames = {"accel x", "accel y", "accel z"};
 
-constexpr double kGyroPlausible = 10;  // rad/s, median; above it the unit is deg/s
+constexpr double kGyroPlausible = 10;  // rad/s, median; a higher one means deg/s
 constexpr std::size_t kMaxProbed = 4000;
 
 enum class Sensor : std::uint8_t { kOther, kGyro, kAccel };
 
-/// What a column's name says: "w_RS_S_x", "gx", "omega_x", "angular_velocity.x" or "a_RS_S_x", "ax", "acc_x",
-/// "linear_acceleration.x", in any case, with or without a unit.
+/// Detects the sensor from a column's name: "w_RS_S_x", "gx", "omega_x", "angular_velocity.x" or "a_RS_S_x",
+/// "ax", "acc_x", "linear_acceleration.x", in any case, with or without a unit.
 Sensor sensorOf(std::string name) {
   std::erase_if(name, [](unsigned char c) { return std::isspace(c) != 0 || c == '"' || c == '#'; });
   for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -39,8 +39,8 @@ Sensor sensorOf(std::string name) {
   return Sensor::kOther;
 }
 
-/// True where the names of the first three columns after the stamp are the accelerometer's, and the next the
-/// gyro's.
+/// Whether the first three columns after the stamp are named as the accelerometer and the next three as the
+/// gyro.
 bool accelFirst(const std::string& header) {
   std::size_t accel = 0;
   std::size_t gyro = 0;
@@ -100,7 +100,7 @@ void orderSamples(std::vector<ImuSample>& samples, const std::string& name, LogC
 }
 
 ForceLevel forceLevel(const std::vector<ImuSample>& samples) {
-  // A drone's rotors shake at 50 Hz and above.
+  // Averages out a drone's rotors, which shake at 50 Hz and above.
   constexpr Duration kMean = Duration::fromMilliseconds(100);
   std::vector<double> sizes;
   for (std::size_t i = 0; i < samples.size();) {

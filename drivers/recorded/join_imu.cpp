@@ -3,8 +3,8 @@
 namespace swiftlet {
 namespace {
 
-// Accelerometers run at 60 Hz and more: beyond this, samples were lost, and a line says nothing of the
-// motion.
+// Accelerometers run at 60 Hz and more. A longer gap means lost samples, and interpolation across it would be
+// wrong.
 constexpr Duration kLongestGap = Duration::fromMilliseconds(100);
 
 }  // namespace
@@ -13,7 +13,7 @@ std::vector<ImuSample> joinImu(const std::vector<ImuSample>& gyro, const std::ve
                                std::uint64_t& left_out) {
   std::vector<ImuSample> joined;
   joined.reserve(gyro.size());
-  std::size_t after = 0;  // the first accelerometer's sample not before the gyroscope's
+  std::size_t after = 0;  // first accelerometer sample not before the gyroscope's
   for (const ImuSample& sample : gyro) {
     while (after < accel.size() && accel[after].stamp < sample.stamp) ++after;
     const bool same = after < accel.size() && accel[after].stamp == sample.stamp;

@@ -1,8 +1,8 @@
 #pragma once
 // The label images of a log: `mav0/labels0`, a folder like a camera's with data.csv and 8-bit grey PNG whose
-// values are labels, in camera 0's raw (distorted) geometry. Not every image has one.
+// values are labels, in camera 0's raw (distorted) geometry. Some frames may have none.
 //
-// Host side: opening allocates and throws InputError; at() decodes into one buffer, valid until the next
+// Host side: opening allocates and throws InputError. at() decodes into one buffer, valid until the next
 // call.
 
 #include <string>
@@ -19,7 +19,7 @@ namespace swiftlet {
 
 class LabelImages {
  public:
-  /// `log`: the sequence, its mav0 or an archive. A log without label images gives none at any stamp.
+  /// `log`: the sequence, its mav0 or an archive; if it has no label images, at() never returns one.
   LabelImages(const std::string& log, ImageSize size, LogWarnings& warnings);
 
   /// The image with exactly this stamp; empty if there is none. Missing, damaged or wrongly sized files are

@@ -32,7 +32,7 @@ rosmsg::CameraInfo cameraInfoOf(const CameraModel& model) {
   const Eigen::Vector4d& d = model.distortion();
   info.d.assign(d.data(), d.data() + d.size());
   info.distortion_model = model.kind() == CameraKind::kEquidistant ? "equidistant" : "plumb_bob";
-  if (model.kind() == CameraKind::kPinholeRadtan) info.d.push_back(0);  // plumb_bob has five
+  if (model.kind() == CameraKind::kPinholeRadtan) info.d.push_back(0);  // plumb_bob has five coefficients
   const Eigen::Vector4d& f = model.intrinsics();
   info.k = {f[0], 0, f[2], 0, f[1], f[3], 0, 0, 1};
   info.p = {f[0], 0, f[2], 0, 0, f[1], f[3], 0, 0, 0, 1, 0};
@@ -60,7 +60,7 @@ void writePixels(MessageBag& bag, std::size_t camera, Stamp stamp, std::span<con
 
 void writePicture(MessageBag& bag, std::size_t camera, Stamp stamp, std::span<const std::uint8_t> picture,
                   rosmsg::CameraInfo& info) {
-  constexpr std::uint8_t kPng = 0x89;  // JPEG begins with 0xFF
+  constexpr std::uint8_t kPng = 0x89;  // first byte of PNG; JPEG begins with 0xFF
   rosmsg::CompressedImage image;
   image.format = picture.front() == kPng ? "png" : "jpeg";
   image.data = picture;

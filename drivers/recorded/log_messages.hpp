@@ -1,5 +1,5 @@
 #pragma once
-// The messages of a log in a bag: topics /imu0, /cam0/image_raw, /cam0/camera_info, ... and their content
+// Writes the messages of a log into a bag: topics /imu0, /cam0/image_raw, /cam0/camera_info, ...
 // (docs/export.md).
 
 #include <cstddef>
@@ -12,16 +12,16 @@
 
 namespace swiftlet {
 
-/// `plumb_bob` or `equidistant`, not rectified.
+/// `plumb_bob` or `equidistant`, unrectified.
 [[nodiscard]] rosmsg::CameraInfo cameraInfoOf(const CameraModel& model);
 
-/// The sensor's own axes; rad/s, m/s^2.
+/// In the sensor's own axes; rad/s, m/s^2.
 void writeImu(MessageBag& bag, const ImuSample& sample);
 
-/// 8-bit grey without padding behind its rows, with its CameraInfo.
+/// 8-bit grey without row padding, with its CameraInfo.
 void writePixels(MessageBag& bag, std::size_t camera, Stamp stamp, std::span<const std::uint8_t> pixels,
                  rosmsg::CameraInfo& info);
-/// PNG or JPEG.
+/// A PNG or JPEG file as compressed image, with its CameraInfo.
 void writePicture(MessageBag& bag, std::size_t camera, Stamp stamp, std::span<const std::uint8_t> picture,
                   rosmsg::CameraInfo& info);
 

@@ -1,12 +1,11 @@
 #pragma once
 // What a replay needs from a log of any format: calibration, one time-ordered stream of IMU samples and
 // single-camera images, and the truth if the log has one.
-//
 // Order: by stamp; at equal stamps the IMU sample first, then camera 0, then camera 1. So every sample with a
 // stamp not later than an image's comes before that image. The stream ends with the last image (in a log
-// without images with the last sample) unless LogOptions::imu_after_last_image is set. Frames: samples in
-// body axes (samples of an IMU that is rotated in the body are rotated to it), raw (distorted) images. Host
-// side: opening allocates and throws InputError; next() reuses fixed buffers.
+// without images with the last sample) unless LogOptions::imu_after_last_image is set. Frames: samples are in
+// body axes (those of an IMU that is rotated in the body are rotated), images are raw (distorted). Host side:
+// opening allocates and throws InputError; next() reuses fixed buffers.
 
 #include <cstdint>
 #include <functional>
@@ -32,15 +31,15 @@ struct LogOptions {
   std::string calibration;
   std::string imu_calibration;  ///< the Kalibr IMU file, if it is not beside the camchain
   CalibrationOptions calibration_options;
-  /// For calibrating: no calibration is read. Lenses have the images' sizes alone, cameras are as many as the
-  /// log has, the body has the IMU's own axes, and there may be no IMU. Numbered images are a second apart;
-  /// equal numbers of two cameras are one moment.
+  /// For calibration: no calibration is read. The rig has as many cameras as the log, lenses have only a
+  /// size, the body has the IMU's axes, and there may be no IMU. Numbered images are stamped a second apart;
+  /// equal numbers of two cameras get the same stamp.
   bool uncalibrated = false;
-  bool mono = false;                  ///< leave camera 1 out
-  bool without_images = false;        ///< neither look for images nor deliver any: tracks take their place
-  bool imu_after_last_image = false;  ///< deliver the samples after the last image too
+  bool mono = false;                  ///< ignore camera 1
+  bool without_images = false;        ///< neither search nor deliver images; tracks can replace them
+  bool imu_after_last_image = false;  ///< also deliver samples after the last image
   Duration shift_margin;              ///< Rig::shift_margin
-  /// Asked for each image in turn before it is decoded; false: it is passed over. Empty: all are wanted.
+  /// Called for each image before it is decoded; false: the image is skipped. Empty: all are wanted.
   std::function<bool(Stamp stamp, std::uint32_t camera)> wants_image;
 };
 
@@ -57,32 +56,32 @@ class LogSource {
   [[nodiscard]] virtual const Calibration& calibration() const = 0;
   /// The next message; false at the end. Images that cannot be used are skipped and counted.
   virtual bool next(SensorMessage& message) = 0;
-  /// False if the next message is certainly no image.
+  /// False only if the next message is certainly not an image.
   [[nodiscard]] virtual bool imageIsNext() const { return true; }
-  /// The file of the image that next() gave last, PNG or JPEG, until next() is called again; empty if the
-  /// log holds pixels.
+  /// The PNG or JPEG file of the image that next() returned last, valid until the next call; empty if the log
+  /// holds raw pixels.
   [[nodiscard]] virtual std::span<const std::uint8_t> picture() const { return {}; }
-  /// Images the log lists, all cameras together, for progress.
+  /// Number of images listed in the log, all cameras together, for progress.
   [[nodiscard]] virtual std::size_t imageCount() const = 0;
-  /// Distinct image stamps the log lists: the most poses a replay can give.
+  /// Number of distinct image stamps in the log: the most poses that a replay can give.
   [[nodiscard]] virtual std::size_t frameCount() const = 0;
-  /// Stamps of the first and the last IMU sample; nothing where the log does not list them.
+  /// Stamps of the first and the last IMU sample; empty if the log does not list them.
   [[nodiscard]] virtual std::optional<std::pair<Stamp, Stamp>> sampleSpan() const { return std::nullopt; }
   [[nodiscard]] virtual const LogCounters& counters() const = 0;
-  /// Lines for the user; grows while the log is read.
+  /// Messages for the user; grows while the log is read.
   [[nodiscard]] virtual const std::vector<std::string>& warnings() const = 0;
-  /// Feature tracks (track_file.hpp) that the log holds in place of images; empty when it has images.
+  /// File of feature tracks (track_file.hpp) that the log holds instead of images; empty if it has images.
   [[nodiscard]] virtual std::string trackFile() const { return {}; }
-  /// The truth of the estimator's body, in time order; empty when the log has none. Read on demand.
-  /// `warnings` receives what was left out.
+  /// Truth of the estimator's body, in time order; empty if the log has none. Read on demand. `warnings`
+  /// receives what was skipped.
   [[nodiscard]] virtual Trajectory groundTruth(LogWarnings& /*warnings*/) const { return {}; }
   [[nodiscard]] Trajectory groundTruth() const {
     LogWarnings unused;
     return groundTruth(unused);
   }
-  /// Source of the truth, for the summary; empty without one.
+  /// Name of the truth's source for the summary; empty if there is none.
   [[nodiscard]] virtual std::string groundTruthName() const { return {}; }
-  /// next() goes on with the first message that is not before `stamp`. Reads nothing.
+  /// Makes next() continue with the first message not before `stamp`. Reads nothing.
   virtual void seek(Stamp stamp) = 0;
 
   [[nodiscard]] const Rig& rig() const { return calibration().rig; }

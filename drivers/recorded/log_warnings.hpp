@@ -1,6 +1,6 @@
 #pragma once
-// What went wrong while a log was read: counters for the summary, lines for the user. Nothing that a
-// reader drops is dropped without one of these.
+// Counters and messages about problems found while reading a log: counters for the summary, lines for the
+// user. Readers drop nothing without recording it here.
 
 #include <array>
 #include <cstdint>
@@ -17,17 +17,17 @@ struct LogCounters {
   std::uint64_t bad_rows = 0;                       ///< rows that do not match the file's format, skipped
   std::uint64_t nan_rows = 0;                       ///< rows with NaN or infinity, skipped
   std::uint64_t out_of_order = 0;     ///< rows or messages earlier than one before them, put in order
-  std::uint64_t repeated_stamps = 0;  ///< rows with the stamp of another, skipped
+  std::uint64_t repeated_stamps = 0;  ///< rows with the stamp of an earlier row, skipped
   std::uint64_t missing_images = 0;   ///< listed files that do not exist, skipped
   std::uint64_t damaged_images = 0;   ///< truncated, of another size or undecodable, skipped
 };
 
-/// Lines for the user, at most `kPerKind` of one kind so that a broken log does not flood the screen.
+/// Lines for the user, at most `kPerKind` of each kind, so that a damaged log does not flood the screen.
 class LogWarnings {
  public:
   static constexpr std::uint64_t kPerKind = 5;
 
-  /// `count` is the kind's counter after the event: beyond kPerKind the line is not kept.
+  /// Adds a line unless `count`, the kind's counter after the event, is above kPerKind.
   void addCounted(std::uint64_t count, const std::string& line);
   void add(const std::string& line) { lines_.push_back(line); }
   [[nodiscard]] const std::vector<std::string>& lines() const { return lines_; }

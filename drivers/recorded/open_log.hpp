@@ -1,5 +1,5 @@
 #pragma once
-// Opens a log of any kind this build can read, told by its content.
+// Opens a log of any kind that this build can read; the kind is detected by content.
 
 #include <memory>
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace swiftlet {
 
-/// A EuRoC/ASL folder or an archive of one, a ROS 1 bag where the build has rosbag-storage, or a flight
-/// recording (its folder or that of its run). InputError otherwise.
+/// A EuRoC/ASL folder or an archive of one, a bag (rosbag2, MCAP, or ROS 1 if the build has rosbag-storage),
+/// or a flight recording (its folder or that of its run). InputError otherwise.
 std::unique_ptr<LogSource> openLog(const std::string& path, const LogOptions& options = {});
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// Puts rows of a log in the order of their stamps; counts what was out of order or repeated.
+// Sorts rows of a log by stamp; counts rows that were out of order or repeated.
 
 #include <algorithm>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace swiftlet {
 
-/// Row has a member `stamp`. Of rows with one stamp the first stays.
+/// `Row` has a member `stamp`. Of rows with the same stamp the first is kept.
 template <typename Row>
 void orderByStamp(std::vector<Row>& rows, const std::string& name, LogCounters& counters,
                   LogWarnings& warnings) {

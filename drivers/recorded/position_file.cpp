@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kPoseFields = 8;
 constexpr double kSecondsBelow = 1e11;
 
-/// Earth-centred coordinates [m].
+/// Earth-centred coordinates [m] of latitude [deg], longitude [deg], height [m].
 Eigen::Vector3d earthCentred(const Eigen::Vector3d& geodetic) {
   constexpr double kSemiMajor = 6378137.0;  // m, WGS 84
   constexpr double kFlattening = 1 / 298.257223563;
@@ -32,7 +32,7 @@ Eigen::Vector3d earthCentred(const Eigen::Vector3d& geodetic) {
           (radius * (1 - kEccentricity2) + geodetic.z()) * s};
 }
 
-/// Words of a header's columns, in small letters.
+/// Column names of a header in lower case, letters only and without units.
 std::vector<std::string> columnsOf(const std::string& header) {
   std::vector<std::string> columns = {""};
   for (const char c : header) {
@@ -41,7 +41,7 @@ std::vector<std::string> columnsOf(const std::string& header) {
     } else if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
       columns.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     } else if (c == '[' || c == '(') {
-      columns.back() += ' ';  // a unit begins
+      columns.back() += ' ';  // the unit follows
     }
   }
   for (std::string& column : columns) column = column.substr(0, column.find(' '));
@@ -56,7 +56,7 @@ std::optional<std::size_t> find(const std::vector<std::string>& columns,
   return static_cast<std::size_t>(found - columns.begin());
 }
 
-/// Where a row's three coordinates stand.
+/// Columns of a row's three coordinates.
 struct Columns {
   explicit Columns(const std::string& header) {
     const std::vector<std::string> names = columnsOf(header);

@@ -29,14 +29,14 @@ void RecordedLog::checkRates(const std::string& name) {
   }
 }
 
-/// From each camera's first picture.
+/// Takes the size from the first image of each camera.
 void RecordedLog::takeImageSizes() {
   for (std::uint32_t camera = 0; camera < calibration_.rig.camera_count; ++camera) {
     for (const ImageEntry& entry : images_) {
       if (entry.camera != camera) continue;
       const Fetched fetched = fetch(entry, {}, nullptr);
       if (fetched.found.width <= 0 || fetched.found.height <= 0) continue;
-      // A lens of no use but its size.
+      // A placeholder lens of which only the size is used.
       calibration_.rig.camera[camera] =
           CameraModel(CameraKind::kEquidistant, fetched.found.width, fetched.found.height,
                       Eigen::Vector4d(fetched.found.width, fetched.found.width,

@@ -1,7 +1,7 @@
 #pragma once
-// The part that every stored log shares: samples and image entries known and in order, pictures
-// fetched one at a time into a small pool. A format (ASL folder, ROS bag) fills the lists and knows how
-// to fetch a picture. Memory: 56 bytes a sample, about 100 an image entry, kImageSlots pictures a camera.
+// Common base of all stored logs: samples and image entries are listed in order, images are fetched one at a
+// time into a small pool. A format (ASL folder, bag) fills the lists and implements fetch(). Memory: 56 bytes
+// per sample, about 100 per image entry, kImageSlots images per camera.
 
 #include <array>
 #include <string>
@@ -42,11 +42,11 @@ class RecordedLog : public LogSource {
 
   explicit RecordedLog(const LogOptions& options) : options_(options) {}
 
-  /// Decodes picture `entry` into `out` (expected.width * expected.height bytes).
+  /// Decodes the image of `entry` into `out` (expected.width * expected.height bytes).
   virtual Fetched fetch(const ImageEntry& entry, ImageSize expected, std::uint8_t* out) = 0;
 
-  /// To be called once the lists are complete: corrects samples and turns them into body axes, checks rates
-  /// against the calibration, orders the images, reserves the pool.
+  /// Call once the lists are complete: corrects samples and rotates them to body axes, checks rates against
+  /// the calibration, sorts the images, allocates the pool.
   void prepare(const std::string& name);
 
   LogOptions options_;

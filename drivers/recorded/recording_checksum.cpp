@@ -18,7 +18,7 @@ constexpr std::size_t kSlices = 8;
 
 using Tables = std::array<std::array<std::uint32_t, 256>, kSlices>;
 
-/// tables[k][b]: what byte b does to the CRC when k more bytes follow it ("slicing by 8").
+/// tables[k][b]: contribution of byte b to the CRC when k more bytes follow it ("slicing by 8").
 constexpr Tables makeTables() {
   Tables tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {

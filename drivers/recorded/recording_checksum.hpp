@@ -1,7 +1,7 @@
 #pragma once
-// CRC-32C (Castagnoli, polynomial 0x1EDC6F41, reflected), the checksum of flight recordings: finds every
-// burst of up to 32 bits, and both SSE 4.2 and Armv8 have an instruction for it.
-// Cost: about 6 GB/s with the instruction; the table twin, used if there is none, about 1.8 GB/s.
+// CRC-32C (Castagnoli, polynomial 0x1EDC6F41, reflected), the checksum of flight recordings. It detects every
+// burst of up to 32 bits, and SSE 4.2 and Armv8 have instructions for it. Cost: about 6 GB/s with the
+// instruction; about 1.8 GB/s with tables, used if there is none.
 
 #include <cstdint>
 #include <span>
@@ -12,7 +12,7 @@ namespace swiftlet {
 /// crc32c(crc32c(0, a), b) is the CRC of a followed by b.
 std::uint32_t crc32c(std::uint32_t before, std::span<const std::uint8_t> bytes);
 
-/// The same by tables, on any machine: the twin that the fast one is tested against.
+/// The same with tables, on any machine; the reference in tests of the fast version.
 std::uint32_t crc32cByTable(std::uint32_t before, std::span<const std::uint8_t> bytes);
 
 }  // namespace swiftlet

@@ -27,8 +27,8 @@ class SegmentOnDisk final : public RecordingFile {
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::uint64_t size() const override { return size_; }
 
-  /// Opened anew each time: a long recording has more segments than a process may have open files, and
-  /// opening costs little beside an image.
+  /// Opens the file for each read: a long recording has more segments than a process may have open files, and
+  /// opening costs little compared with reading an image.
   std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) const override {
     const int file = ::open(name_.c_str(), O_RDONLY | O_CLOEXEC);
     if (file < 0) refuse(offset);
@@ -110,7 +110,7 @@ RecordingFiles listRecordingFiles(const std::string& folder) {
 
 RecordingReadLock::RecordingReadLock(const std::string& folder)
     : folder_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-  // Where the file system knows no locks, reading goes on without.
+  // Reading continues without a lock if the file system does not support locks.
   if (folder_ < 0 || ::flock(folder_, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   ::close(folder_);
   throw InputError(folder, 0, "", "this recording is still being written",
@@ -127,7 +127,7 @@ RecordingWindow::RecordingWindow(const RecordingFile& file)
 void RecordingWindow::load(std::uint64_t offset) {
   begin_ = offset;
   held_ = offset < file_.size() ? file_.read(offset, bytes_) : 0;
-  // What was written after the opening does not belong to it.
+  // Ignore bytes written after the file was opened.
   held_ =
       static_cast<std::size_t>(std::min<std::uint64_t>(held_, file_.size() - std::min(offset, file_.size())));
 }

@@ -1,6 +1,6 @@
 #pragma once
-// The segments of a recording as bytes: files of a folder, or memory in tests.
-// Host side: allocates and throws InputError.
+// The segments of a recording as bytes: files of a folder, or memory in tests. Host side: allocates and
+// throws InputError.
 
 #include <cstdint>
 #include <memory>
@@ -18,24 +18,24 @@ class RecordingFile {
   virtual ~RecordingFile() = default;
 
   [[nodiscard]] virtual const std::string& name() const = 0;  ///< for messages
-  [[nodiscard]] virtual std::uint64_t size() const = 0;       ///< bytes, as found at opening
+  [[nodiscard]] virtual std::uint64_t size() const = 0;       ///< bytes, as found when it was opened
   /// Reads up to out.size() bytes from `offset` on; fewer only at the end. InputError if the disk fails.
   virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) const = 0;
 };
 
-/// All segments, number i at place i.
+/// All segments, in order of their numbers.
 struct RecordingFiles {
   std::string folder;  ///< for messages
   std::vector<std::unique_ptr<RecordingFile>> segments;
 };
 
-/// The folder with the segments: `path` itself or its `recording`; empty when neither has any.
+/// The folder with the segments: `path` itself or its subfolder `recording`; empty if neither has any.
 std::string findRecordingFolder(const std::string& path);
 
-/// InputError when a segment is missing between others.
+/// InputError if a segment between others is missing.
 RecordingFiles listRecordingFiles(const std::string& folder);
 
-/// While it exists no writer can start a new recording in the folder. InputError if one is being written.
+/// While this exists no writer can start a new recording in the folder. InputError if one is being written.
 class RecordingReadLock {
  public:
   explicit RecordingReadLock(const std::string& folder);
@@ -47,11 +47,11 @@ class RecordingReadLock {
   int folder_ = -1;
 };
 
-/// Bytes of one file through a window, so that records of any size can be read.
+/// Reads one file through a window, so that records of any size can be processed.
 class RecordingWindow {
  public:
   explicit RecordingWindow(const RecordingFile& file);
-  /// The bytes from `offset` on that the window holds (at least one before the end, then none).
+  /// The bytes from `offset` that the window holds: at least one before the end of the file, none after it.
   std::span<const std::uint8_t> some(std::uint64_t offset);
   /// The next `count` bytes (a few KiB at most); fewer at the end of the file.
   std::span<const std::uint8_t> exactly(std::uint64_t offset, std::size_t count);

@@ -107,7 +107,7 @@ bool decode(std::span<const std::uint8_t, kRecordHeaderBytes> in, std::uint32_t 
   header.sequence = from.u64();
   header.length = from.u32();
   header.kind = static_cast<RecordKind>(from.u16());
-  // The mark first: it costs nothing, and a search for the next record tries many places.
+  // Check the mark first: it is cheap, and a search for the next record tries many positions.
   if (from.u16() != kRecordMark) return false;
   return stated == crc32c(run_checksum, in.subspan(sizeof(std::uint32_t)));
 }

@@ -24,7 +24,7 @@
 namespace swiftlet {
 
 enum class RecordKind : std::uint16_t {
-  kRun = 0,  ///< the run's header; always the first record
+  kRun = 0,  ///< header of the run; always the first record
   kImu = 1,
   kImage0 = 2,
   kImage1 = 3,
@@ -32,14 +32,14 @@ enum class RecordKind : std::uint16_t {
   kTrackStep = 5,
   kSmoothStep = 6,
   kLoss = 7,  ///< records of another kind were lost here
-  kEnd = 8,   ///< the recording was closed properly
+  kEnd = 8,   ///< the recording was closed normally
   kMeshStep = 9,
   kLoopStep = 10,
   kMapStep = 11,
 };
 inline constexpr std::size_t kRecordKinds = 12;
 
-/// Messages and steps: the records that may be lost before the recorder.
+/// Messages and steps: the records that can be lost before they reach the recorder.
 constexpr bool canBeLost(RecordKind kind) {
   return (kind >= RecordKind::kImu && kind <= RecordKind::kSmoothStep) ||
          (kind >= RecordKind::kMeshStep && kind <= RecordKind::kMapStep);
@@ -53,27 +53,28 @@ constexpr RecordKind imageKind(std::size_t camera) {
 const char* pluralName(RecordKind kind);
 
 inline constexpr std::uint32_t kRecordingVersion = 1;
-/// As PNG's: a byte that is no text, both line ends and an end of text file find every kind of damage that
-/// a transfer as text does.
+/// Like PNG's signature: a non-ASCII byte, both line ends and an end-of-file character detect any damage by
+/// transfer as text.
 inline constexpr std::array<std::uint8_t, 8> kSegmentMagic{0x89, 'S', 'W', 'R', '\r', '\n', 0x1A, '\n'};
 inline constexpr std::size_t kSegmentHeaderBytes = 64;
 inline constexpr std::size_t kRecordHeaderBytes = 24;
 inline constexpr std::size_t kRecordAlignment = 8;
 inline constexpr std::uint16_t kRecordMark = 0x7253;
-/// Largest payload: beyond any camera, and it keeps a reader's memory bounded on hostile input.
+/// Largest payload: beyond any camera; it bounds a reader's memory for malicious input.
 inline constexpr std::size_t kMaxPayloadBytes = 256U << 20U;
 inline constexpr std::uint32_t kMaxSegments = 1'000'000;
 
 inline constexpr std::size_t kImuPayloadBytes = 64;
-inline constexpr std::size_t kImageHeadBytes = 40;  ///< then width * height pixels
+inline constexpr std::size_t kImageHeadBytes = 40;  ///< followed by width * height pixels
 inline constexpr std::size_t kPropagateStepBytes = 16;
 inline constexpr std::size_t kTrackStepBytes = 64;
 inline constexpr std::size_t kSmoothStepBytes = 40;
-inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by programs without a mesh
+inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by older programs, without
+                                                                 ///< planes
 inline constexpr std::size_t kMeshStepBytes = 24;
 inline constexpr std::size_t kLoopStepBytes = 32;
-inline constexpr std::size_t kMapStepHeadBytes = 80;  ///< then depth and labels, if there are any
-inline constexpr std::size_t kMapStepSceneAt = 48;    ///< of the scene's stamp within it
+inline constexpr std::size_t kMapStepHeadBytes = 80;  ///< followed by depth and labels, if any
+inline constexpr std::size_t kMapStepSceneAt = 48;    ///< offset of the scene's stamp in it
 inline constexpr std::size_t kLossBytes = 16;
 inline constexpr std::size_t kEndBytes = 8;
 
@@ -94,13 +95,13 @@ struct RecordHeader {
   RecordKind kind = RecordKind::kRun;
   std::uint64_t sequence = 0;
   std::uint32_t length = 0;       ///< payload without padding
-  std::uint32_t payload_crc = 0;  ///< payload with padding, from the run's CRC on
+  std::uint32_t payload_crc = 0;  ///< of payload and padding, continued from the run's CRC
 };
 
-/// recording_000042.swr, written into `name` with its final zero.
+/// recording_000042.swr as a null-terminated text.
 using SegmentName = std::array<char, 24>;
 SegmentName segmentName(std::uint32_t segment);
-/// The number in a file name of that form; false for any other name.
+/// Parses the number in such a file name; false for any other name.
 bool parseSegmentName(const std::string& name, std::uint32_t& segment);
 
 /// The CRC that all CRCs of a run's records continue from.
@@ -114,14 +115,14 @@ enum class SegmentHeaderState : std::uint8_t {
   kGood,
   kForeign,       ///< does not start with the magic bytes
   kDamaged,       ///< the checksum is wrong
-  kOtherVersion,  ///< `version` is not kRecordingVersion (its checksum is right)
+  kOtherVersion,  ///< `version` is not kRecordingVersion; the checksum is right
 };
 SegmentHeaderState decode(std::span<const std::uint8_t, kSegmentHeaderBytes> in, SegmentHeader& header);
-/// False when it is not a sound record header of the run.
+/// False if this is not a valid record header of the run.
 bool decode(std::span<const std::uint8_t, kRecordHeaderBytes> in, std::uint32_t run_checksum,
             RecordHeader& header);
 
-/// Writes numbers one after the other into memory that is large enough.
+/// Writes numbers in sequence to memory that must be large enough.
 class LittleEndianWriter {
  public:
   explicit LittleEndianWriter(std::uint8_t* out) : begin_(out), at_(out) {}
@@ -151,7 +152,7 @@ class LittleEndianWriter {
   std::uint8_t* at_;
 };
 
-/// Reads them back. Beyond the end everything is zero and good() false.
+/// Reads them back. Beyond the end all values are zero and good() is false.
 class LittleEndianReader {
  public:
   explicit LittleEndianReader(std::span<const std::uint8_t> in) : left_(in) {}

@@ -6,10 +6,10 @@
 namespace swiftlet {
 namespace {
 
-// Everything but the texts, with room to spare.
+// Everything except texts, with margin.
 constexpr std::size_t kFixedPartBytes = 1024;
-// Beside the order in its word: the cameras' readout follows the clock shift. Programs that know of no
-// rolling shutter refuse such a recording.
+// Flag in the word of the order: the readout of the cameras follows the clock shift. Programs that do not
+// know rolling shutters refuse such a recording.
 constexpr std::uint32_t kRolls = 2;
 constexpr Duration kMaxReadout = Duration::fromMilliseconds(1000);
 
@@ -49,7 +49,7 @@ bool saneSize(int width, int height) {
 }
 
 bool get(LittleEndianReader& from, SE3& T) {
-  // Past SE3's constructor, which would normalize and so change bits.
+  // Not through SE3's constructor, which would normalize and so change bits.
   for (int i = 0; i < 4; ++i) T.rotation.coeffs()[i] = from.f64();
   for (int i = 0; i < 3; ++i) T.translation[i] = from.f64();
   return T.rotation.coeffs().allFinite() && T.translation.allFinite();
@@ -121,7 +121,7 @@ std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   put(to, header.calibration_form);
   put(to, header.settings);
   put(to, header.program_version);
-  // Only where there is one: other recordings stay readable by programs that know of no sensor.
+  // Written only if present: other recordings stay readable by programs that do not know this field.
   if (header.depth_sensor) put(to, *header.depth_sensor);
   payload.resize(to.written());
   return payload;

@@ -1,6 +1,6 @@
 #pragma once
-// What a recorded run was made with: the first record of every recording. Every double comes back with
-// the bits that it had.
+// The first record of every recording: the configuration of the recorded run. Doubles are restored bit for
+// bit.
 
 #include <cstdint>
 #include <optional>
@@ -18,10 +18,10 @@ class LittleEndianReader;
 class LittleEndianWriter;
 
 enum class RecordOrder : std::uint8_t {
-  /// Several threads fed the estimator: a reader merges the streams by arrival (ties: IMU, camera 0,
-  /// camera 1), each stream kept in its own order.
+  /// Several threads fed the estimator: a reader merges the streams by arrival (at equal times IMU, camera 0,
+  /// camera 1); each stream keeps its own order.
   kByArrival = 0,
-  /// One thread fed it and wrote the records as they entered: their order in the file is the order.
+  /// One thread fed it and wrote the records in this order: the order in the file is used.
   kAsWritten = 1,
 };
 
@@ -32,20 +32,21 @@ struct RecordingHeader {
   std::string settings;          ///< the settings in force, as YAML text
   std::string program_version;
   RecordOrder order = RecordOrder::kByArrival;
-  /// Camera and extrinsics of the sensor whose depth images the map used (without an image); none: no sensor.
+  /// Camera and extrinsics of the sensor whose depth images the map used (its image is empty); none: no
+  /// sensor.
   std::optional<DepthImageView> depth_sensor;
 };
 
-/// A camera and its place on the body, in kCameraBytes.
+/// A camera and its extrinsics, in kCameraBytes.
 inline constexpr std::size_t kCameraBytes = 3 * 4 + 8 * 8 + 7 * 8;
 void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam);
-/// False if it is none.
+/// False if the data are not a valid camera.
 bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam);
 
 /// The payload of the first record.
 std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header);
 
-/// Null if it was read, otherwise the name of the invalid field, literal text.
+/// Null if the header is valid, otherwise the name of the invalid field (a literal).
 const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, RecordingHeader& header);
 
 }  // namespace swiftlet

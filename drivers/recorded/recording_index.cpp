@@ -63,15 +63,15 @@ class Indexer {
   RecordingIndex index_;
   RunId run_{};
   std::uint32_t segment_ = 0;
-  std::uint64_t sequence_ = 0;                             ///< of the next record
-  std::array<std::uint64_t, kRecordKinds> last_number_{};  ///< by kind, lost ones counted
+  std::uint64_t sequence_ = 0;                             ///< expected for the next record
+  std::array<std::uint64_t, kRecordKinds> last_number_{};  ///< by kind, lost records included
 };
 
 bool allZero(std::span<const std::uint8_t> bytes) {
   return std::all_of(bytes.begin(), bytes.end(), [](std::uint8_t byte) { return byte == 0; });
 }
 
-/// The CRC of a record's payload and padding; false where the file ends before.
+/// Computes the CRC of a record's payload and padding; false if the file ends before.
 bool payloadChecksum(RecordingWindow& window, std::uint64_t offset, std::uint64_t size, std::uint32_t& crc) {
   while (size > 0) {
     std::span<const std::uint8_t> part = window.some(offset);
@@ -143,7 +143,7 @@ void Indexer::takeRecords(RecordingWindow& window) {
   if (sequence_ == 0) refuse(window.file(), offset, "the run's header is missing", "Record again");
 }
 
-/// Null when a sound record begins at `offset`, else why it is none.
+/// Null if a valid record begins at `offset`, else the reason why not.
 const char* Indexer::faultAt(RecordingWindow& window, std::uint64_t offset, RecordHeader& header) const {
   if (index_.ended) return "data follows the end mark";
   const std::span<const std::uint8_t> bytes = window.exactly(offset, kRecordHeaderBytes);
@@ -164,7 +164,7 @@ const char* Indexer::faultAt(RecordingWindow& window, std::uint64_t offset, Reco
   return there && crc == header.payload_crc ? nullptr : "a record is damaged (checksum)";
 }
 
-/// Takes one record and moves on; false when the recording was cut instead.
+/// Reads one record and advances; false if the recording was cut here instead.
 bool Indexer::takeRecord(RecordingWindow& window, std::uint64_t& offset) {
   RecordHeader header;
   if (const char* fault = faultAt(window, offset, header)) {
@@ -182,7 +182,7 @@ bool Indexer::takeRecord(RecordingWindow& window, std::uint64_t& offset) {
   return true;
 }
 
-/// Payload bytes of a kind; where pixels may follow the least, for kRun unknown (0).
+/// Payload bytes of a kind; the minimum if pixels may follow; 0 (unknown) for kRun.
 std::size_t payloadBytes(RecordKind kind) {
   switch (kind) {
     case RecordKind::kImu:
@@ -336,7 +336,7 @@ void Indexer::takeSmoothStep(LittleEndianReader& from) {
   step.effort.features = from.i32();
   step.effort.keyframes = from.i32();
   (void)from.u32();
-  step.planes = from.u64();  // zero in an older, shorter one
+  step.planes = from.u64();  // zero in an older, shorter record
 }
 
 void Indexer::takeMeshStep(LittleEndianReader& from) {
@@ -417,8 +417,8 @@ void Indexer::cutAt(std::uint64_t offset, const char* reason) {
   }
 }
 
-/// Those of segment `segment` from `offset` on, without the damaged one itself. Counts by headers alone, so
-/// that the search stays one pass whatever the bytes are.
+/// Counts the valid records of a segment from `offset` on, except the damaged one. Only headers are checked,
+/// so that the search stays one pass for any content.
 std::uint64_t Indexer::soundRecords(RecordingWindow& window, std::size_t segment,
                                     std::uint64_t offset) const {
   std::uint64_t found = 0;
@@ -437,8 +437,8 @@ std::uint64_t Indexer::soundRecords(RecordingWindow& window, std::size_t segment
   }
 }
 
-/// By arrival: each stream in its own order, the one whose next message arrived first has its turn. So a
-/// message whose arrival falls behind the one before it follows that one at once.
+/// Merge by arrival: the stream whose next message arrived first is next, and each stream keeps its own
+/// order. A message whose arrival is earlier than its predecessor's therefore follows it immediately.
 void Indexer::mergeTurns() {
   if (index_.header.order == RecordOrder::kAsWritten) return;
   constexpr std::size_t kStreams = 1 + kMaxCameras;

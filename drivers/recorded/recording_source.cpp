@@ -9,10 +9,10 @@
 namespace swiftlet {
 namespace {
 
-// Slots begin at cache lines of their own.
+// Slots start at separate cache lines.
 constexpr std::size_t kSlotAlignment = 64;
 
-/// Pixels and padding of a record.
+/// Bytes of a record after its head: pixels and padding.
 std::size_t bodyBytes(const RecordedImage& entry) { return paddedSize(entry.length) - kImageHeadBytes; }
 std::size_t bodyBytes(const RecordedScene& entry) { return paddedSize(entry.length) - kMapStepHeadBytes; }
 
@@ -233,7 +233,7 @@ bool RecordingSource::mapScene(std::size_t i, SceneImages& scene) {
   ImageView labels;
   labels.width = from.i32();
   labels.height = from.i32();
-  // The record's header is sound and so is its payload; but it may be another record than was indexed.
+  // Header and payload are valid, but the file may have been replaced since it was indexed.
   const std::size_t depth_bytes = sizeof(float) * depth.pixels();
   const auto label_bytes = static_cast<std::size_t>(labels.width) * static_cast<std::size_t>(labels.height);
   if (kMapStepHeadBytes + depth_bytes + label_bytes != entry.length) refuseChanged(entry);
@@ -254,7 +254,7 @@ bool RecordingSource::mapScene(std::size_t i, SceneImages& scene) {
   return true;
 }
 
-/// The record at `entry`, checked again: its header and `head`, and the rest of it.
+/// Reads the record of `entry` into `head` and `body` and verifies it again.
 template <typename Entry>
 void RecordingSource::readSound(const Entry& entry, std::span<std::uint8_t> head,
                                 std::span<std::uint8_t> body) const {

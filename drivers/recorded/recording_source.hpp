@@ -1,19 +1,19 @@
 #pragma once
-// A flight recording (recording_writer.hpp) as a log, and as what a threaded run took step by step.
+// A flight recording (recording_writer.hpp) as a log, and as the inputs of each step of a threaded run.
 //
-// As a log: every IMU sample and image comes back with the bits that it had, repeated and reversed
-//   stamps too, in the order in which they entered the estimator (RecordingHeader::order). So a lockstep
-//   replay of it is the lockstep replay of what was recorded. The stream ends with what entered last,
-//   samples behind the last image included. Samples are in body axes. There is no truth: it did not enter.
-// Damage: the recording ends where it is damaged; warnings() name file, byte and how much is missing, and
-//   what its writer had lost (see recording_index.hpp for what is refused instead).
-// Memory: recording_index.hpp's per record, LogSource::kImageSlots pictures a camera, one depth image and
-//   one label image.
-// Cost: opening reads and checks the whole recording once; an image is read and checked again when wanted.
-// While it lives no program can begin a new recording in the folder.
+// As a log: every IMU sample and image is returned bit for bit, including those with repeated or decreasing
+// stamps, in the order in which they entered the estimator (RecordingHeader::order). So its lockstep replay
+// equals the lockstep replay of the recorded input. The stream ends with the last input, samples after the
+// last image included. Samples are in body axes. There is no truth.
+// Damage: the recording ends where it is damaged. warnings() name file and byte, how much is missing, and
+//   what the writer had lost (recording_index.hpp lists what is refused instead).
+// Memory: that of recording_index.hpp per record, LogSource::kImageSlots images per camera, one depth image
+//   and one label image.
+// Cost: opening reads and checks the whole recording once; an image is read and checked again when needed.
+// While this object exists no program can start a new recording in the folder.
 //
-// LogOptions: `mono` leaves camera 1 out; `without_images` leaves images out; `calibration` takes the place
-//   of the recorded one (same image sizes; the samples are in body axes already and are not turned).
+// LogOptions: `mono` omits camera 1; `without_images` omits images; `calibration` replaces the recorded one
+//   (same image sizes required; samples are already in body axes and are not rotated).
 
 #include <array>
 #include <memory>
@@ -31,7 +31,7 @@ namespace swiftlet {
 
 class RecordingSource final : public LogSource {
  public:
-  /// `files` are the segments, `folder` is locked against a new recording (empty: not).
+  /// `files`: the segments. `folder`: locked against a new recording; empty: no lock.
   RecordingSource(RecordingFiles files, const LogOptions& options, const std::string& folder = {});
 
   [[nodiscard]] const Calibration& calibration() const override { return calibration_; }
@@ -46,24 +46,25 @@ class RecordingSource final : public LogSource {
   [[nodiscard]] const RecordedSteps& steps() const { return index_.steps; }
   [[nodiscard]] const std::vector<RecordingLoss>& losses() const { return index_.losses; }
   [[nodiscard]] const RecordingCut& cut() const { return index_.cut; }
-  /// The end mark is there, nothing was cut and nothing was lost: a threaded run can be repeated to its end.
+  /// The end mark is present, nothing was cut and nothing was lost: a threaded run can be repeated to its
+  /// end.
   [[nodiscard]] bool complete() const;
-  /// The first place where records were lost while recording, with file, byte, kind and number: a threaded
-  /// run cannot be repeated then. Nothing for a recording that is only cut off: it can, up to the cut, which
-  /// warnings() names.
+  /// The first records that were lost while recording, with file, byte, kind and number: a threaded run
+  /// cannot be repeated then. Empty for a recording that was only cut, since that can be repeated up to the
+  /// cut (see warnings()).
   [[nodiscard]] std::optional<InputError> firstLoss() const;
 
-  /// IMU samples recorded, from 0; options make no difference.
+  /// Number of IMU samples recorded; independent of the options.
   [[nodiscard]] std::size_t imuCount() const { return index_.imu.size(); }
   [[nodiscard]] const RecordedImu& imu(std::size_t i) const { return index_.imu[i]; }
-  /// What the steps call it: from 1, lost samples counted.
+  /// The sample's number in the steps: from 1, lost samples included.
   [[nodiscard]] std::uint64_t imuNumber(std::size_t i) const;
-  /// Number of the camera's last recorded image; 0 without any.
+  /// Number of the camera's last recorded image; 0 if there is none.
   [[nodiscard]] std::uint64_t lastImage(std::size_t camera) const;
-  /// Image `number` (from 1, as TrackStep::image) of a camera; false when the recording does not have it. Its
-  /// pixels stay valid until kImageSlots further images of that camera, those of next() counted.
+  /// Image `number` (from 1, as TrackStep::image) of a camera; false if the recording does not have it. Its
+  /// pixels stay valid until kImageSlots further images of that camera, including those of next().
   bool image(std::size_t camera, std::uint64_t number, CameraFrame& frame);
-  /// Depth and labels that steps().map[i] took; false if it took none. Valid until the next call.
+  /// Depth and labels used in steps().map[i]; false if it used none. Valid until the next call.
   bool mapScene(std::size_t i, SceneImages& scene);
 
  private:
@@ -94,7 +95,7 @@ class RecordingSource final : public LogSource {
   LogCounters counters_;
   LogWarnings warnings_;
   std::array<Pool, kMaxCameras> pools_;
-  std::vector<float> scene_;  ///< depth, then labels; for the largest
+  std::vector<float> scene_;  ///< depth, then labels; large enough for all scenes
   std::size_t image_count_ = 0;
   std::size_t frame_count_ = 0;
   std::size_t turn_ = 0;
@@ -102,10 +103,10 @@ class RecordingSource final : public LogSource {
   std::array<std::size_t, kMaxCameras> next_image_{};
 };
 
-/// True when `path` is the folder of a recording, or a run's folder that holds one in `recording/`.
+/// Whether `path` is the folder of a recording, or a run's folder with one in `recording/`.
 bool isRecording(const std::string& path);
 
-/// Opens it. InputError if nothing can be replayed.
+/// Opens a recording. InputError if nothing can be replayed.
 std::unique_ptr<RecordingSource> openRecording(const std::string& path, const LogOptions& options = {});
 
 }  // namespace swiftlet

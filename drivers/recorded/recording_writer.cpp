@@ -22,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMinBufferBytes = 128U << 10U;
-// From here on a second copy of the pixels costs more than a call of the kernel.
+// From this size on, copying the pixels again costs more than a system call.
 constexpr std::size_t kDirectBytes = 32U << 10U;
-// Rows of an image with gaps between its rows that go to the kernel with one call.
+// Rows per system call, for an image with row padding.
 constexpr std::size_t kPiecesPerCall = 64;
 constexpr mode_t kFileMode = 0644;
 constexpr std::array<std::uint8_t, kRecordAlignment> kPadding{};
@@ -43,7 +43,7 @@ Status statusOf(int error) {
   }
 }
 
-/// `piece` is only read, but iovec is made for reading and writing.
+/// iovec has no const: the kernel only reads `piece`.
 iovec readOnly(std::span<const std::uint8_t> piece) {
   return {const_cast<std::uint8_t*>(piece.data()), piece.size()};
 }
@@ -87,7 +87,7 @@ RecordingWriter::RecordingWriter(const std::string& folder, const RecordingHeade
       throw InputError(folder, 0, "", std::string("cannot write a recording here: ") + what,
                        "Give a writable folder on a disk with free space");
     }
-    // The new folder's own entry; a file system that cannot sync folders is none of the user's concern.
+    // Sync the entry of the new folder; ignore file systems that cannot sync folders.
     const int parent = ::openat(folder_, "..", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (parent >= 0) {
       (void)::fsync(parent);
@@ -128,7 +128,8 @@ void RecordingWriter::removeEarlierRun(const std::string& folder) {
     const std::string name = entry.path().filename().string();
     if (parseSegmentName(name, segment)) names.push_back(name);
   }
-  // The last first: whatever stops this leaves a beginning of the old run, not a run with holes.
+  // Delete the last segment first: an interruption then leaves the beginning of the old run, not a run with
+  // gaps.
   std::sort(names.rbegin(), names.rend());
   for (const std::string& name : names) {
     if (::unlinkat(folder_, name.c_str(), 0) == 0) continue;
@@ -153,13 +154,13 @@ int RecordingWriter::beginSegment() {
   iovec piece = readOnly(bytes);
   const WriteResult result = writeAll(&piece, 1);
   if (result.error != 0) {
-    // An empty segment would only puzzle a reader.
+    // Do not leave an empty segment.
     ::unlinkat(folder_, name.data(), 0);
     ::close(file_);
     file_ = -1;
     return result.error;
   }
-  // Without its entry in the folder a synced file would still be lost with the power.
+  // Without this, a synced file could still be lost in a power cut with its directory entry.
   (void)::fsync(folder_);
   offset_ = bytes.size();
   ++statistics_.segments;
@@ -184,7 +185,7 @@ Status RecordingWriter::imu(const ImuSample& sample, Stamp arrival) {
   return put(RecordKind::kImu, payload.data(), payload.size());
 }
 
-/// Without gaps between its rows an image is one row.
+/// An image without row padding is treated as one row.
 RecordingWriter::Pixels RecordingWriter::pixelsOf(const ImageView& image) {
   if (image.empty()) return {};
   const auto width = static_cast<std::size_t>(image.width);
@@ -213,7 +214,7 @@ Status RecordingWriter::image(const CameraFrame& frame) {
 }
 
 Status RecordingWriter::mapStep(const MapStep& step, const SceneImages& scene) {
-  // Depth goes to the file as it lies in memory.
+  // Depth is written as it lies in memory.
   static_assert(std::endian::native == std::endian::little);
   const bool depth = scene.depth.depth != nullptr;
   const PinholeIntrinsics& camera = scene.depth.camera;
@@ -280,7 +281,7 @@ Status RecordingWriter::putPixels(RecordKind kind, std::span<const std::uint8_t>
   return okStatus();
 }
 
-/// The pixels go to the kernel from where they are, behind the buffer and with it.
+/// Writes the buffer and then the pixels, from the caller's memory, to the kernel.
 Status RecordingWriter::putDirect(const RecordHeader& header, std::span<const std::uint8_t> head,
                                   std::span<const Pixels> planes) {
   appendHeader(header);
@@ -416,7 +417,7 @@ Status RecordingWriter::put(RecordKind kind, const std::uint8_t* payload, std::s
   return okStatus();
 }
 
-/// Also counts the record: its payload must follow.
+/// Also counts the record; its payload must follow.
 void RecordingWriter::appendHeader(const RecordHeader& header) {
   encode(header, run_checksum_,
          std::span<std::uint8_t, kRecordHeaderBytes>(buffer_.data() + filled_, kRecordHeaderBytes));
@@ -426,7 +427,7 @@ void RecordingWriter::appendHeader(const RecordHeader& header) {
   statistics_.bytes += kRecordHeaderBytes + paddedSize(header.length);
 }
 
-/// Begins the next segment where a record of `bytes` would pass the end of this one.
+/// Starts the next segment if a record of `bytes` would not fit in this one.
 bool RecordingWriter::makeRoom(std::size_t bytes) {
   const std::uint64_t used = offset_ + filled_;
   if (used + bytes <= segment_bytes_ || used == kSegmentHeaderBytes) return true;
@@ -481,8 +482,8 @@ bool RecordingWriter::flushBuffer() {
   return true;
 }
 
-/// Of the buffer (and what should have followed it) the first `written` bytes got to the file: counts the
-/// records that did not, and cuts the file behind the last that did.
+/// Only the first `written` bytes of the buffer (and of what should have followed it) reached the file:
+/// counts the records that did not, and cuts the file after the last complete record.
 void RecordingWriter::loseBuffer(std::size_t written) {
   std::size_t kept = 0;
   std::size_t at = 0;
@@ -501,7 +502,7 @@ void RecordingWriter::loseBuffer(std::size_t written) {
   }
   offset_ += kept;
   filled_ = 0;
-  // Should this fail too, a reader cuts there all the same.
+  // If this fails too, readers cut the recording at the same place.
   if (::ftruncate(file_, static_cast<off_t>(offset_)) != 0) errno = 0;
 }
 

@@ -2,25 +2,24 @@
 // Writes a flight recording: everything that entered the estimator, in a form that survives a kill and a
 // power cut. recording_source.hpp reads it; recording_format.hpp has the layout.
 //
-// Threads: one, the recorder's own. Nothing here is on the flight path; calls may block in the kernel.
-// Memory: one buffer of RecordingOptions::buffer_bytes, all of it touched at construction; nothing is
-//   allocated afterwards. Pixels of a large image go from the caller's memory to the kernel without a copy.
-// Cost: one pass over the payload for the checksum and the kernel's copy.
-// Errors: InputError at construction (folder not writable, recording in use). Afterwards a Status: the
-//   first error of the disk (full, I/O) ends the writing for good, later calls return it at once, and
-//   statistics().lost says how many records of each kind did not get to the file. What was written before
-//   stays whole: the segment is cut behind its last complete record.
+// Threads: one, the recorder's own. Not on the flight path; calls may block in the kernel.
+// Memory: one buffer of RecordingOptions::buffer_bytes, touched at construction; no allocation afterwards.
+//   Pixels of a large image go from the caller's memory to the kernel without a copy.
+// Cost: one pass over the payload for the checksum, and the kernel's copy.
+// Errors: InputError at construction (folder not writable, recording in use). Afterwards a Status: the first
+//   disk error (full, I/O) ends writing permanently, later calls return it at once, and statistics().lost
+//   counts the records of each kind that did not reach the file. What was written before stays valid: the
+//   segment is cut after its last complete record.
 //
-// What is safe when:
-//   flush()  everything so far is with the kernel: survives a crash or kill -9 of the program.
-//   sync()   everything so far is on the disk: survives a power cut. An owner that flushes after each drain
-//   of
-//            its rings and syncs every 0.5 s loses at most the last 0.5 s and the duration of one sync.
+// What survives:
+//   after flush(): everything so far is in the kernel and survives a crash or kill -9 of the program.
+//   after sync(): everything so far is on the disk and survives a power cut. An owner that flushes after each
+//     drain of its rings and syncs every 0.5 s loses at most the last 0.5 s and the duration of one sync.
 //   A full segment is synced when the next one begins.
 //
 // Segments: a new file every RecordingOptions::segment_bytes. Segments of an earlier run in the folder are
-//   deleted first, other files stay. While it is written the folder is locked against another writer and
-//   against readers (flock; the kernel lets go of it however the program ends).
+//   deleted first, other files are kept. During writing the folder is locked against other writers and
+//   readers (flock; the kernel releases it however the program ends).
 
 #include <sys/uio.h>
 
@@ -42,44 +41,44 @@
 namespace swiftlet {
 
 struct RecordingOptions {
-  std::size_t segment_bytes = 64U << 20U;  ///< a segment ends before the record that would pass this
-  std::size_t buffer_bytes = 1U << 20U;    ///< at least 128 KiB is taken
+  std::size_t segment_bytes = 64U << 20U;  ///< a new segment starts before the record that would exceed this
+  std::size_t buffer_bytes = 1U << 20U;    ///< at least 128 KiB is used
 };
 
 struct RecordingStatistics {
   std::uint64_t records = 0;   ///< complete in the file or the buffer
-  std::uint64_t bytes = 0;     ///< of these, with the segments' headers
-  std::uint64_t segments = 0;  ///< files begun
+  std::uint64_t bytes = 0;     ///< of these and of the segments' headers
+  std::uint64_t segments = 0;  ///< files started
   std::uint64_t syncs = 0;
-  /// Given to the writer but not written because of an error, by RecordKind.
+  /// Records passed to the writer but not written because of an error, by RecordKind.
   std::array<std::uint64_t, kRecordKinds> lost{};
 };
 
 class RecordingWriter {
  public:
-  /// Begins a recording in `folder` (created if needed; `RUN/recording` by custom). The first segment with
-  /// its header is on the disk when this returns.
+  /// Starts a recording in `folder` (created if needed; by convention `RUN/recording`). The first segment
+  /// with its header is on the disk when this returns.
   RecordingWriter(const std::string& folder, const RecordingHeader& header,
                   const RecordingOptions& options = {});
   RecordingWriter(const RecordingWriter&) = delete;
   RecordingWriter& operator=(const RecordingWriter&) = delete;
-  /// Flushes. Without end() before, a reader takes the recording for one that was cut off.
+  /// Flushes. Without end() before, readers report the recording as cut off.
   ~RecordingWriter();
 
-  /// `arrival`: when it reached the estimator, not falling along the stream; its stamp for a log.
+  /// `arrival`: when it reached the estimator (for a log, its stamp); must not decrease within the stream.
   Status imu(const ImuSample& sample, Stamp arrival);
-  /// kInvalidInput for a camera beyond the rig's kMaxCameras or an image above 256 MiB (counted as lost).
+  /// kInvalidInput (counted as lost) for a camera number of kMaxCameras or more or an image above 256 MiB.
   Status image(const CameraFrame& frame);
   Status propagateStep(const PropagateStep& step);
   Status trackStep(const TrackStep& step);
   Status smoothStep(const SmoothStep& step);
   Status meshStep(const MeshStep& step);
   Status loopStep(const LoopStep& step);
-  /// `scene`: depth and labels that the map used with the frame, may be empty; only the metres of its depth
-  /// image and its labels are stored. kInvalidInput (counted as lost) for a depth image of another size than
-  /// the header's sensor, and for more than 256 MiB.
+  /// `scene`: depth and labels that the map used with the frame, may be empty; only the depth values in
+  /// metres and the labels are stored. kInvalidInput (counted as lost) for a depth image with another size
+  /// than that of the header's sensor, or above 256 MiB.
   Status mapStep(const MapStep& step, const SceneImages& scene);
-  /// `count` records of `kind` never came here because a buffer before the writer was full; they would have
+  /// `count` records of `kind` were lost before the writer because a buffer was full; they would have
   /// followed the last record of that kind.
   Status loss(RecordKind kind, std::uint64_t count);
 
@@ -101,7 +100,7 @@ class RecordingWriter {
   struct Pixels {
     const std::uint8_t* data = nullptr;
     std::size_t row_bytes = 0;
-    std::size_t stride = 0;  ///< bytes from row to row
+    std::size_t stride = 0;  ///< bytes per row
     std::size_t rows = 0;
 
     [[nodiscard]] std::size_t bytes() const { return row_bytes * rows; }
@@ -129,7 +128,7 @@ class RecordingWriter {
   void fail(int error);
   Status refuse(RecordKind kind);
 
-  std::vector<std::uint8_t> buffer_;  ///< whole records, except while an image is written directly
+  std::vector<std::uint8_t> buffer_;  ///< complete records, except while an image is written directly
   std::size_t filled_ = 0;
   std::size_t segment_bytes_ = 0;
   int folder_ = -1;
@@ -138,7 +137,7 @@ class RecordingWriter {
   std::uint32_t run_checksum_ = 0;
   std::optional<DepthImageView> depth_sensor_;
   std::uint32_t segment_ = 0;
-  std::uint64_t offset_ = 0;    ///< bytes of the segment that the kernel has
+  std::uint64_t offset_ = 0;    ///< bytes of the segment that were passed to the kernel
   std::uint64_t sequence_ = 0;  ///< of the next record
   bool ended_ = false;
   Status status_;

@@ -28,10 +28,10 @@ constexpr const char* kHeaderRemedy =
 constexpr const char* kRowRemedy =
     "Write each line as: stamp [ns], id, camera (0 or 1), u, v and, if the header has it, keyframe (0 or 1)";
 constexpr const char* kDiskRemedy = "Check that the disk is not full";
-// Far outside any image: a number like this is damage.
+// Far outside any image: a larger value is damage.
 constexpr double kMaxPixel = 1e5;
 
-/// Names of the header line, without '#' and surrounding blanks.
+/// Column names of the header line, without '#' and surrounding blanks.
 std::vector<std::string_view> namesOf(std::string_view header) {
   if (header.starts_with('#')) header.remove_prefix(1);
   std::vector<std::string_view> names;
@@ -83,7 +83,7 @@ void TrackReader::checkHeader() {
   columns_ = names.size();
 }
 
-/// A row that CsvReader itself could not use (too long, no number) is the end of it here.
+/// A row that CsvReader itself rejects (too long, not a number) is an error here.
 void TrackReader::refuseRejected() const {
   const auto& bad = csv_.firstBad();
   if (bad) throw InputError(bad->file, bad->line, bad->field, bad->message, kRowRemedy);
@@ -100,7 +100,7 @@ bool TrackReader::readRow() {
   return found;
 }
 
-/// A whole number from 0 to `most`.
+/// An integer from 0 to `most`.
 std::int64_t TrackReader::integer(Column column, std::int64_t most) {
   std::int64_t value = 0;
   if (!csv_.integer(column, kColumns[column].name, value)) refuseRejected();

@@ -1,20 +1,20 @@
 #pragma once
-// Feature tracks in a file, in place of images: what `simulate --tracks` writes and replay reads, to run
-// the back-end alone. One line per sighting:
+// Feature tracks in a file instead of images, written by `simulate --tracks` and read by replay to run only
+// the back-end. One line per sighting:
 //
 //   #timestamp [ns],id,camera,u [px],v [px],keyframe
 //   1403636579763555584,17,0,310.25,201.5,1
 //   1403636579763555584,17,1,288.125,201.75,1
 //   1403636579813555584,,,,,0
 //
-// The first line names the columns, in this order; `keyframe` may be left out. Lines of one stamp are one
-// frame and stand together, in any order; stamps rise. A line whose id, camera and pixel are empty is a
-// frame (part) without tracks. Lines of one id are one landmark: both cameras' sightings at one stamp
-// become one TrackedFeature. Pixels are those of the raw (distorted) image, (0,0) the centre of the
-// top-left pixel. `keyframe` is 0 or 1, the same for the whole frame.
+// The first line names the columns, in this order; `keyframe` may be omitted. Lines with the same stamp are
+// one frame; they are consecutive, in any order. Stamps rise. A line with empty id, camera and pixel is a
+// frame (or part of one) without tracks. Lines with the same id are one landmark: the sightings of both
+// cameras at one stamp become one TrackedFeature. Pixels are in the raw (distorted) image, (0,0) is the
+// centre of the top-left pixel. `keyframe` is 0 or 1, the same for the whole frame.
 //
-// The file is made by a program, so nothing in it is repaired or skipped: whatever is malformed is an
-// InputError with file, line, field and remedy.
+// The file is written by a program, so nothing is repaired or skipped: anything malformed is an InputError
+// with file, line, field and remedy.
 
 #include <cstdint>
 #include <cstdio>
@@ -28,34 +28,34 @@
 
 namespace swiftlet {
 
-/// Reads frame by frame, in memory that one frame needs.
+/// Reads frame by frame; memory of one frame.
 class TrackReader {
  public:
-  /// InputError when the file cannot be read, has another header or holds no line.
+  /// InputError if the file cannot be read, has another header or no data.
   explicit TrackReader(const std::string& path);
   /// Reads text in memory, which must outlive the reader; `name` names the file in messages.
   TrackReader(const std::string& name, std::string_view text);
   TrackReader(const TrackReader&) = delete;
   TrackReader& operator=(const TrackReader&) = delete;
 
-  /// The next frame; false at the end. Sets everything but `keyframe` where the file does not tell. A camera
-  /// counts as present when it saw something.
+  /// The next frame; false at the end. Leaves `keyframe` unchanged if the file has no such column. A camera
+  /// counts as present if it has a sighting.
   bool next(TrackedFrame& frame);
 
-  /// The file marks which frames are keyframes.
+  /// Whether the file marks keyframes.
   [[nodiscard]] bool hasKeyframes() const { return columns_ > kKeyframe; }
-  /// One more than the highest camera number so far.
+  /// Highest camera number so far, plus one.
   [[nodiscard]] std::size_t cameras() const { return cameras_; }
-  /// Landmarks beyond kMaxFeatures in a frame so far: left out, the first ones stay.
+  /// Number of landmarks dropped so far because a frame had more than kMaxFeatures; the first ones are kept.
   [[nodiscard]] std::uint64_t surplus() const { return surplus_; }
-  /// Lines for the user about the surplus.
+  /// Messages for the user about dropped landmarks.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_.lines(); }
 
  private:
   enum Column : std::size_t { kStamp, kId, kCamera, kU, kV, kKeyframe, kColumnCount };
   struct Row {
     Stamp stamp;
-    bool sighting = false;  ///< false: the frame alone
+    bool sighting = false;  ///< false: a frame without tracks
     TrackId id = 0;
     std::size_t camera = 0;
     Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
@@ -78,11 +78,11 @@ class TrackReader {
   Row row_;  ///< read ahead
   bool more_ = false;
   bool any_ = false;
-  std::map<TrackId, std::size_t> slots_;  ///< of the frame being read; kMaxFeatures: left out
+  std::map<TrackId, std::size_t> slots_;  ///< in the frame being read; kMaxFeatures: dropped
   std::size_t cameras_ = 0;
   std::uint64_t next_index_ = 0;
   std::uint64_t surplus_ = 0;
-  std::uint64_t crowded_ = 0;  ///< frames with surplus
+  std::uint64_t crowded_ = 0;  ///< frames with dropped landmarks
 };
 
 /// Summary of a whole file. Reading it before a run rejects a bad file before any output is created.
@@ -94,7 +94,7 @@ struct TrackFileFacts {
 };
 TrackFileFacts surveyTrackFile(const std::string& path);
 
-/// Writes the same format, keyframe column included. InputError when that fails.
+/// Writes the same format, with the keyframe column. InputError if that fails.
 class TrackWriter {
  public:
   explicit TrackWriter(const std::string& path);
@@ -102,7 +102,7 @@ class TrackWriter {
   TrackWriter(const TrackWriter&) = delete;
   TrackWriter& operator=(const TrackWriter&) = delete;
 
-  /// Stamps must rise. Pixels read back to the same floats.
+  /// Stamps must rise. Pixels are restored to the same floats.
   void write(const TrackedFrame& frame);
   void close();
 

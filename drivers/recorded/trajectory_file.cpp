@@ -26,7 +26,7 @@ constexpr std::array<const char*, 9> kMotionNames = {"vx",  "vy",  "vz",  "bgx",
 
 enum class StampUnit { kUnknown, kSeconds, kNanoseconds };
 
-/// The unit of a TUM file's stamps, from its first row.
+/// The unit of a TUM file's stamps, determined from its first row.
 StampUnit stampUnit(const CsvReader& csv) {
   double value = 0;
   if (!parseDouble(csv.field(0), value) || !std::isfinite(value)) return StampUnit::kUnknown;

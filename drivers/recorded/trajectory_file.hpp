@@ -1,11 +1,11 @@
 #pragma once
-// Trajectories in files. Reading tells the format by content:
-//  - TUM: `t tx ty tz qx qy qz qw`, blanks between; a stamp above 1e14 is taken as nanoseconds, below
-//    1e11 as seconds, between is refused; the first row decides for the file.
-//  - EuRoC csv (state_groundtruth_estimate0, OpenVINS' and other variants): `ns, p xyz, q wxyz` and,
-//    where there are 17 columns, `v xyz, gyro bias xyz, accel bias xyz`.
-// Quaternions further than 1e-3 from unit norm are bad rows. Bad rows are skipped and counted, files of
-// them refused (CsvReader). Writing: TUM with 9 decimals of the stamp, made from integer nanoseconds.
+// Reads and writes trajectory files. The format is detected by content:
+//  - TUM: `t tx ty tz qx qy qz qw`, separated by blanks. Stamps above 1e14 are nanoseconds, below 1e11
+//    seconds, between them refused; the first row decides for the file.
+//  - EuRoC csv (state_groundtruth_estimate0, OpenVINS' and other variants): `ns, p xyz, q wxyz` and, with 17
+//    columns, `v xyz, gyro bias xyz, accel bias xyz`.
+// Quaternions further than 1e-3 from unit norm are bad rows. Bad rows are skipped and counted; files with too
+// many are refused (CsvReader). Writing: TUM with 9 decimals of the stamp, from integer nanoseconds.
 
 #include <Eigen/Core>
 #include <cstdio>
@@ -35,21 +35,21 @@ Trajectory readTrajectory(const std::string& path, LogCounters& counters, LogWar
 Trajectory readTrajectoryText(const std::string& name, std::string_view text, LogCounters& counters,
                               LogWarnings& warnings);
 
-/// For files written by swiftlet: the first row that is bad, repeated or out of order is an InputError with
-/// its line; no row is skipped. `remedy` ends the message.
+/// For files written by swiftlet: no row is skipped; the first one that is bad, repeated or out of order is
+/// an InputError with its line. `remedy` ends the message.
 Trajectory readWholeTrajectory(const std::string& path, const std::string& remedy);
 
-/// Poses with stamps of the IMU's clock, as a log's truth has them, with those of the images' clock:
-/// t_image = t_imu - `camera_to_imu_shift`.
+/// Converts poses stamped by the IMU's clock, such as a log's truth, to the clock of the images: t_image =
+/// t_imu - `camera_to_imu_shift`.
 Trajectory onImageClock(Trajectory poses, Duration camera_to_imu_shift);
 
 /// "sec.nnnnnnnnn", exact.
 std::string formatSeconds(Stamp stamp);
 
-/// One TUM line without line end; the quaternion written with qw >= 0.
+/// One TUM line without line end; the quaternion is written with qw >= 0.
 std::string formatTum(Stamp stamp, const SE3& T_world_body);
 
-/// Writes a TUM file line by line. InputError when the file cannot be opened or the disk is full.
+/// Writes a TUM file line by line. InputError if the file cannot be opened or the disk is full.
 class TumWriter {
  public:
   explicit TumWriter(const std::string& path);
