@@ -5,7 +5,7 @@
 
 #include <cerrno>
 
-// <sys/ioctl.h> brings in what clashes with <asm/termbits.h>.
+// Declared here because <sys/ioctl.h> conflicts with <asm/termbits.h>.
 extern "C" int ioctl(int descriptor, unsigned long request, ...) noexcept;
 
 namespace swiftlet {

@@ -4,9 +4,9 @@
 
 namespace swiftlet {
 
-/// Asks the port for `baud` in both directions; 0 or errno.
+/// Sets `baud` in both directions. Returns 0 or errno.
 int setBaudRate(int descriptor, unsigned baud);
-/// What it runs at; 0 or errno.
+/// Reads the actual baud rate. Returns 0 or errno.
 int readBaudRate(int descriptor, unsigned& baud);
 
 }  // namespace swiftlet

@@ -1,13 +1,13 @@
 #pragma once
-// swiftlet's own framing for microcontrollers that put a bare inertial chip on a serial port, and for the
-// camera trigger that they make or see: both in one clock, the microcontroller's.
+// swiftlet's own framing for microcontrollers that connect a bare inertial chip to a serial port and generate
+// or observe the camera trigger. Samples and edges have the microcontroller's clock.
 //
 //   A9 1C | version and kind | length | payload | CRC     all little-endian
 //   byte 2: version (1) in the high four bits, kind in the low four; byte 3: bytes of payload
-//   CRC-16/CCITT-FALSE over byte 2 to the payload's end
+//   CRC-16/CCITT-FALSE from byte 2 to the end of the payload
 //   kind 1, sample: time u64 ns | counter u32 | gyro 3 x f32 rad/s | accel 3 x f32 m/s^2 [| temperature f32]
 //   kind 2, edge:   time u64 ns | counter u32 | line u8 | rising u8
-// A payload may grow at its end; what is not known there is passed over. docs/serial.md has the sender.
+// Later versions may append fields to a payload; unknown ones are ignored. docs/serial.md has a sender.
 
 #include <cstddef>
 #include <cstdint>

@@ -6,9 +6,9 @@
 namespace swiftlet {
 namespace {
 
-// A longer silence is an interruption, not a number of lost samples.
+// A longer gap is an interruption, not a number of lost samples.
 constexpr Duration kLongestGap = Duration::fromMilliseconds(2'000);
-// Half of the narrowest counter's range.
+// Half of the smallest counter's range.
 constexpr std::uint64_t kLongestCount = 0x8000;
 
 }  // namespace

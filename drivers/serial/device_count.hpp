@@ -1,6 +1,5 @@
 #pragma once
-// Counters and clocks of sensors, which wrap at 16 or 32 bits, made 64 bits wide; and what their steps say of
-// lost samples.
+// Unwraps sensor counters and clocks of 16 or 32 bits to 64 bits, and counts lost samples from their steps.
 
 #include <array>
 #include <cstddef>
@@ -21,7 +20,7 @@ class WrappingClock {
     last_ = value;
     return total_;
   }
-  /// Unwraps a value close to the last one without advancing: for an event reported next to a sample.
+  /// Unwraps a value close to the last one without changing the state, for events reported next to a sample.
   [[nodiscard]] std::int64_t near(T value) const {
     return last_ ? total_ + difference(value, *last_) : static_cast<std::int64_t>(value);
   }
@@ -60,10 +59,10 @@ class SampleGaps {
  public:
   struct Step {
     std::uint64_t missing = 0;
-    bool went_back = false;  ///< the clock, or a counter by more than half of 16 bits
+    bool went_back = false;  ///< the clock went back, or a counter went back modulo 16 bits
   };
   Step step(std::optional<Stamp> device, std::optional<std::uint64_t> counter);
-  /// Median of the clock's last nine steps; empty: fewer came, or there is a counter.
+  /// Median of the clock's last nine steps; empty if there were fewer, or if there is a counter.
   [[nodiscard]] std::optional<Duration> usualStep() const;
   void forget();
 
@@ -71,13 +70,13 @@ class SampleGaps {
   std::uint64_t missingByClock(Duration step);
 
   static constexpr std::size_t kSteps = 9;
-  std::array<std::int64_t, kSteps> steps_ = {};  ///< [ns], the last ones in a ring
+  std::array<std::int64_t, kSteps> steps_ = {};  ///< [ns], ring of the last steps
   std::size_t step_count_ = 0;
   std::optional<Stamp> device_;
   std::optional<std::uint64_t> counter_;
 };
 
-/// `value` units of `ns_per_unit` as a stamp; empty beyond what 63 bits of nanoseconds hold (292 years).
+/// `value` units of `ns_per_unit` as a stamp; empty if it exceeds 63 bits of nanoseconds (292 years).
 std::optional<Stamp> stampOf(std::uint64_t value, std::uint64_t ns_per_unit);
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// A queue of fixed capacity within one thread: first in, first out, full refuses. Memory: inside the object.
+// A FIFO queue of fixed capacity within one thread; a full queue refuses. Memory: inside the object.
 
 #include <array>
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace swiftlet {
 template <typename T, std::size_t kCapacity>
 class EventQueue {
  public:
-  /// False, and nothing changed, when full.
+  /// False, without any change, if the queue is full.
   [[nodiscard]] bool push(const T& value) {
     if (size_ == kCapacity) return false;
     items_[(first_ + size_++) % kCapacity] = value;

@@ -10,7 +10,7 @@
 namespace swiftlet {
 namespace {
 
-/// A literal's characters without the 0 that ends it.
+/// A literal's characters without the final 0.
 template <std::size_t kSize>
 constexpr std::array<std::uint8_t, kSize - 1> bytesOf(const char (&text)[kSize]) {
   std::array<std::uint8_t, kSize - 1> bytes = {};
@@ -27,7 +27,7 @@ void append(FixedVector<std::uint8_t, 40>& to, std::span<const std::uint8_t> fro
   for (const std::uint8_t byte : from) static_cast<void>(to.tryPushBack(byte));
 }
 
-/// Of `base`, the whole part that comes nearest to `rate`.
+/// Integer divisor of `base` that comes nearest to `rate`.
 std::uint16_t divisorOf(double base, double rate) {
   constexpr double kMost = 65'535;
   return static_cast<std::uint16_t>(std::clamp(std::round(base / rate), 1.0, kMost));
@@ -66,7 +66,7 @@ constexpr auto kXsOutputReply = bytes(0xFA, 0xFF, 0xC1);
 constexpr auto kXsMeasure = bytes(0xFA, 0xFF, 0x10, 0x00, 0xF1);
 constexpr auto kXsMeasureReply = bytes(0xFA, 0xFF, 0x11);
 constexpr auto kXsRefusal = bytes(0xFA, 0xFF, 0x42);
-/// Begin, bus, message, length, four items of an identifier and a rate, sum.
+/// Preamble, bus, message, length, four items of identifier and rate, checksum.
 constexpr std::size_t kXsOutputLength = 4 + 16 + 1;
 
 ConfigurationStep xsensStep(std::size_t index, double rate) {
@@ -84,7 +84,7 @@ ConfigurationStep xsensStep(std::size_t index, double rate) {
   BigFieldWriter writer(message);
   writer.copy(bytes(0xFA, 0xFF, 0xC0, 0x10));
   const auto hertz = static_cast<std::uint16_t>(std::clamp(std::round(rate), 1.0, 2000.0));
-  // PacketCounter and SampleTimeFine with every message.
+  // PacketCounter and SampleTimeFine in every message.
   for (const std::uint16_t value : {std::uint16_t{0x1020}, kXsEachMessage, std::uint16_t{0x1060},
                                     kXsEachMessage, kXsAcceleration, hertz, kXsRateOfTurn, hertz}) {
     writer.u16(value);
@@ -99,7 +99,7 @@ ConfigurationStep xsensStep(std::size_t index, double rate) {
   return step;
 }
 
-// Each is answered by a field F1: the command and 0 for accepted.
+// Each command is answered by a field F1: the command and a result, 0 for accepted.
 constexpr std::uint8_t kMipBase = 0x01;  // descriptor sets of commands
 constexpr std::uint8_t kMipThreeDm = 0x0C;
 constexpr std::uint8_t kMipSensorData = 0x80;
@@ -118,7 +118,7 @@ constexpr std::array<MipCommand, 5> kMip = {
     {mipCommand(kMipBase, 0x02, "idle"), mipCommand(kMipThreeDm, 0x0E, "tell the base rate"),
      mipCommand(kMipThreeDm, 0x0F, "set reference time, acceleration and rate"),
      mipCommand(kMipThreeDm, 0x11, "stream on"), mipCommand(kMipBase, 0x06, "resume")}};
-/// The acknowledgement, then length, 8E, descriptor set and the rate.
+/// The acknowledgement, then length, 8E, descriptor set and rate.
 constexpr std::size_t kMipBaseAnswer = 4 + 5;
 
 ConfigurationStep mipStep(std::size_t index, std::uint16_t decimation) {
@@ -139,7 +139,7 @@ ConfigurationStep mipStep(std::size_t index, std::uint16_t decimation) {
   writer.field(command.command, std::span<const std::uint8_t>(data.data(), data.size()));
   append(step.bytes, std::span(packet).first(writer.finish()));
   step.reply = command.reply;
-  // Of another result than 0; looked for after the reply.
+  // An acknowledgement with another result than 0; searched after the reply.
   step.refusal = command.refusal;
   step.answer_length = index == kMipAskBase ? kMipBaseAnswer : step.reply.size();
   step.what = command.what;
@@ -180,7 +180,7 @@ void ImuConfiguration::answered(std::size_t index, std::span<const std::uint8_t>
   }
 }
 
-/// The sensor gives back what it has set.
+/// The sensor returns the rates that it has set.
 void ImuConfiguration::answeredByXsens(std::span<const std::uint8_t> answer) {
   constexpr std::size_t kHead = 4, kItems = 4;
   BigFieldReader items(answer.subspan(kHead));

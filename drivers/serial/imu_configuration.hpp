@@ -1,12 +1,12 @@
 #pragma once
-// Configures a sensor to send what ImuDecoder reads, at a rate: step by step, each after the reply to the
-// previous one. VectorNav, Xsens, MIP; a bridge needs none, and ImuStreamRequest (drivers/mavlink) configures
-// an autopilot.
+// Configures a sensor to send the messages that ImuDecoder reads at a rate, step by step: each step follows
+// the reply to the previous one. For VectorNav, Xsens and MIP; a bridge needs none, and ImuStreamRequest
+// (drivers/mavlink) configures an autopilot.
 //
 // Rates: VectorNav divides 800 Hz, MIP its base rate, which is queried; Xsens accepts a rate or returns
-// another. The nearest is set, and rate() returns it. After a refusal or without a reply the last step must
-// still be sent: it lets the sensor send again. Memory: fixed. Threads: one. Source: the manuals named in
-// each protocol's header; docs/serial.md.
+// another one. The nearest rate is set; rate() returns it. After a refusal or a missing reply the last step
+// must still be sent, because it makes the sensor send again. Memory: fixed. Threads: one. Source: the
+// manuals named in each protocol's header; docs/serial.md.
 
 #include <array>
 #include <cstdint>
@@ -19,23 +19,23 @@ namespace swiftlet {
 
 struct ConfigurationStep {
   FixedVector<std::uint8_t, 40> bytes;
-  std::span<const std::uint8_t> reply;    ///< first bytes of its answer if it was accepted
-  std::span<const std::uint8_t> refusal;  ///< the same when it was not; may be empty
-  std::size_t answer_length = 0;          ///< bytes that answered() needs, from the reply's first on
-  const char* what = "";                  ///< in words
+  std::span<const std::uint8_t> reply;    ///< first bytes of the answer if the step was accepted
+  std::span<const std::uint8_t> refusal;  ///< first bytes of the answer if it was refused; may be empty
+  std::size_t answer_length = 0;          ///< bytes needed by answered(), from the reply's first byte
+  const char* what = "";                  ///< description for messages
 };
 
 class ImuConfiguration {
  public:
-  /// `rate`: readings a second [Hz], above 0.
+  /// `rate`: readings per second [Hz], above 0.
   ImuConfiguration(ImuProtocol protocol, double rate) : protocol_(protocol), rate_(rate), set_(rate) {}
 
   [[nodiscard]] std::size_t steps() const;
-  /// The step `index`, which may depend on the answers before.
+  /// Step `index`, which can depend on earlier answers.
   [[nodiscard]] ConfigurationStep step(std::size_t index) const;
-  /// The answer to it, `answer_length` bytes.
+  /// Takes the answer to a step, `answer_length` bytes.
   void answered(std::size_t index, std::span<const std::uint8_t> answer);
-  /// What the sensor sends then [Hz], as far as it is known.
+  /// Rate that the sensor will send [Hz], as far as known.
   [[nodiscard]] double rate() const { return set_; }
 
  private:
@@ -44,7 +44,7 @@ class ImuConfiguration {
   ImuProtocol protocol_;
   double rate_;
   double set_;
-  double base_rate_ = 0;  ///< of a MIP sensor [Hz]
+  double base_rate_ = 0;  ///< [Hz] of a MIP sensor
 };
 
 }  // namespace swiftlet

@@ -146,15 +146,15 @@ void ImuDecoder::readScaledImu(const MavlinkFrame& frame, InertialFrame& content
   content.in_range = content.device.has_value();
 }
 
-/// The first sender and sensor is kept to.
+/// Accepts only the first sender and sensor.
 bool ImuDecoder::isOurs(const MavlinkFrame& frame, std::uint8_t sensor) {
   const MavlinkImuSource sender{frame.system, frame.component, sensor};
   if (!source_) source_ = sender;
   return source_ == sender;
 }
 
-/// PX4's readings are means over 1 / IMU_INTEG_RATE, 5 ms by default, and are stamped at its end. A stream
-/// that leaves means out has longer steps than that, one of a faster rate has shorter ones.
+/// PX4's readings are means over 1 / IMU_INTEG_RATE, 5 ms by default, stamped at the end. If the stream skips
+/// some means, its steps are longer than the interval; at a higher IMU_INTEG_RATE they are shorter.
 Duration ImuDecoder::meanAge() const {
   constexpr Duration kUsualInterval = Duration::fromMilliseconds(5);
   return {std::min(gaps_.usualStep().value_or(kUsualInterval).ns, kUsualInterval.ns) / 2};

@@ -7,10 +7,10 @@
 // - Every frame must have a valid checksum; after garbage the search continues byte by byte.
 // - A sample with NaN or infinity, or with a clock out of range, is dropped and counted.
 //
-// The headers of VectorNav, Xsens, Mip and Bridge list the messages that each protocol reads. MAVLink gives
-// one inertial message of one sender and one of its sensors: HIGHRES_IMU whose accelerations and rates are
-// both new, or RAW_IMU or SCALED_IMU (takeMavlink()); and CAMERA_TRIGGER as edges. nextMavlink() gives
-// TIMESYNC, HEARTBEAT and COMMAND_ACK.
+// The headers of VectorNav, Xsens, Mip and Bridge list the messages that are read. From MAVLink, one inertial
+// message of one sender and one of its sensors is read: HIGHRES_IMU with new accelerations and rates, or
+// RAW_IMU or SCALED_IMU (takeMavlink()); also CAMERA_TRIGGER as edges. nextMavlink() gives TIMESYNC,
+// HEARTBEAT and COMMAND_ACK.
 //
 // Memory: about 93 kB inside the object, no allocation. Cost: 0.2 to 0.4 us per frame; at most, for
 // adversarial garbage, 0.25 us per byte.
@@ -40,20 +40,20 @@ namespace swiftlet {
 enum class ImuProtocol : std::uint8_t { kVectorNav, kXsens, kMip, kMavlink, kBridge };
 constexpr std::size_t kImuProtocolCount = 5;
 
-/// "vectornav", "xsens", "mip", "mavlink", "bridge": as settings name it.
+/// "vectornav", "xsens", "mip", "mavlink", "bridge": names used in the settings.
 std::string_view name(ImuProtocol protocol);
 std::optional<ImuProtocol> imuProtocol(std::string_view name);
 
-/// Who sends MAVLink readings.
+/// Sender of MAVLink readings.
 struct MavlinkImuSource {
   std::uint8_t system = 0;
   std::uint8_t component = 0;
-  std::uint8_t sensor = 0;  ///< the message's id field
+  std::uint8_t sensor = 0;  ///< id field of the message
 
   bool operator==(const MavlinkImuSource&) const = default;
 };
 
-/// A message of an autopilot received besides the samples: TIMESYNC request or answer, and two more.
+/// A received MAVLink message other than samples and edges: TIMESYNC, HEARTBEAT or COMMAND_ACK.
 struct ReceivedMavlink {
   Stamp arrival;  ///< of the first byte
   std::uint8_t system = 0;
@@ -64,34 +64,34 @@ struct ReceivedMavlink {
 class ImuDecoder {
  public:
   static constexpr std::size_t kMostFed = FrameBuffer<Xsens::kLongestFrame>::kMostFed;
-  /// Capacity for edges and for messages of nextMavlink(): more than the frames with one of them in all bytes
-  /// that feed() accepts, so none is lost if both are read after each read.
+  /// Capacity for edges, and for messages of nextMavlink(). All bytes that feed() accepts hold fewer of them,
+  /// so none is lost if both queues are emptied after each read.
   static constexpr std::size_t kMostEvents = 512;
 
   explicit ImuDecoder(ImuProtocol protocol) : protocol_(protocol) {}
 
   /// Accepts bytes that a read returned at `read_at` (CLOCK_MONOTONIC); `byte_time` is the time of one byte
-  /// on the wire, 0 on USB CDC. Returns how many were accepted: all of kMostFed bytes after next() has
+  /// on the wire, 0 on USB CDC. Returns how many were accepted: up to kMostFed bytes always, once next() has
   /// returned false.
   [[nodiscard]] std::size_t feed(std::span<const std::uint8_t> bytes, Stamp read_at, Duration byte_time) {
     return buffer_.feed(bytes, read_at, byte_time, counters_);
   }
-  /// The next reading; false: feed more.
+  /// The next reading; false: more bytes are needed.
   bool next(ImuReading& reading);
   bool nextEdge(TriggerEdge& edge) { return edges_.pop(edge); }
   bool nextMavlink(ReceivedMavlink& message) { return received_.pop(message); }
-  /// Which message readings are taken from: HighresImu::kId at first, ScaledImu::kRawId or kScaledId.
+  /// Selects the message for readings: HighresImu::kId (the default), ScaledImu::kRawId or kScaledId.
   void takeMavlink(std::uint32_t message);
-  /// Whose MAVLink readings are taken: the first that sends a complete one; empty before.
+  /// Sender of the MAVLink readings: the first that sends a complete one; empty before.
   [[nodiscard]] const std::optional<MavlinkImuSource>& mavlinkSource() const { return source_; }
 
-  /// After the device was gone: discards a partial frame and the state of its clock and counters. Statistics
-  /// and waiting messages are kept.
+  /// Call after the device was unplugged: discards a partial frame and the state of its clock and counters.
+  /// Statistics and waiting messages are kept.
   void restart();
 
   [[nodiscard]] ImuProtocol protocol() const { return protocol_; }
   [[nodiscard]] const StreamCounters& counters() const { return counters_; }
-  /// Bytes that wait for the rest of their frame.
+  /// Bytes of a frame that is not yet complete.
   [[nodiscard]] std::size_t waiting() const { return buffer_.waiting(); }
 
  private:
@@ -114,7 +114,7 @@ class ImuDecoder {
   MavlinkLink link_;
   WrappingCounter<std::uint32_t> mavlink_triggers_;
   std::uint32_t mavlink_message_ = mavlink::HighresImu::kId;
-  std::optional<std::uint8_t> px4_;  ///< the system whose autopilot reports to be PX4
+  std::optional<std::uint8_t> px4_;  ///< the system whose autopilot says that it is PX4
   SampleGaps gaps_;
   EventQueue<TriggerEdge, kMostEvents> edges_;
   EventQueue<ReceivedMavlink, kMostEvents> received_;

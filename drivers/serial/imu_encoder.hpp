@@ -1,5 +1,5 @@
 #pragma once
-// Readings as the bytes that a sensor would send: for hardware-in-the-loop replay and for tests.
+// Encodes readings as the bytes that a sensor would send, for hardware-in-the-loop replay and tests.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,17 +14,17 @@ namespace swiftlet {
 /// HIGHRES_IMU with fresh rates and accelerations, time in whole microseconds.
 std::size_t encodeMavlink(const ImuReading& reading, MavlinkSender& sender, std::span<std::uint8_t> out);
 
-/// Any protocol's frame for a reading. What a protocol cannot carry is left out (counters of VectorNav, MIP
-/// and MAVLink) or rounded (values to f32; the clock to 0.1 ms for Xsens, to 1 us for MAVLink).
+/// Encodes a reading in any protocol. What a protocol cannot carry is omitted (counters of VectorNav, MIP and
+/// MAVLink) or rounded (values to f32; the clock to 0.1 ms for Xsens, to 1 us for MAVLink).
 class ImuEncoder {
  public:
   static constexpr std::size_t kLongestFrame = 80;
 
   explicit ImuEncoder(ImuProtocol protocol) : protocol_(protocol) {
-    // The autopilot itself, as PX4 sends it.
+    // Component id of the autopilot itself, as in PX4.
     sender_.component = 1;
   }
-  /// The frame's length; 0 when `out` is too short (kLongestFrame is enough).
+  /// The frame's length; 0 if `out` is too short (kLongestFrame is enough).
   std::size_t encode(const ImuReading& reading, std::span<std::uint8_t> out);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// What one frame of a sensor held, in SI units and the sensor's axes: what protocols hand to ImuDecoder.
+// Content of one sensor frame in SI units and the sensor's axes; protocols pass it to ImuDecoder.
 
 #include <Eigen/Core>
 
@@ -13,14 +13,14 @@
 namespace swiftlet {
 
 struct InertialFrame {
-  bool known = true;                     ///< false: a kind that is not read
-  bool in_range = true;                  ///< false: a clock or a time that cannot be
+  bool known = true;                     ///< false: a kind that is not decoded
+  bool in_range = true;                  ///< false: an impossible clock or time
   std::optional<Eigen::Vector3d> gyro;   ///< [rad/s]
   std::optional<Eigen::Vector3d> accel;  ///< [m/s^2]
   std::optional<Stamp> device;           ///< the sensor's clock, unwrapped
   std::optional<std::uint64_t> counter;  ///< unwrapped
-  Duration mean_age;                     ///< as ImuReading has it
-  FixedVector<TriggerEdge, 3> edges;     ///< arrival still to be filled in
+  Duration mean_age;                     ///< as in ImuReading
+  FixedVector<TriggerEdge, 3> edges;     ///< their arrival is filled in later
 };
 
 }  // namespace swiftlet

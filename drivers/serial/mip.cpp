@@ -46,7 +46,7 @@ struct GpsFlags {
   unsigned tow_valid, week_valid;
 };
 
-/// Empty for what cannot be: negative, not finite, beyond a year of weeks.
+/// Empty for impossible times: negative, not finite, or too large.
 std::optional<Stamp> gpsStamp(BigFieldReader from, GpsFlags flags) {
   constexpr double kLongestTow = 1e7;  // [s]; a week has 604800, free-running clocks may pass it
   constexpr std::int64_t kNsPerWeek = 604'800'000'000'000;
@@ -60,7 +60,7 @@ std::optional<Stamp> gpsStamp(BigFieldReader from, GpsFlags flags) {
   return Stamp{weeks + std::llround(tow * 1e9)};
 }
 
-/// What one packet says, before it is known what is to be preferred.
+/// Content of one packet before the preferred fields are selected.
 struct Packet {
   std::optional<Eigen::Vector3d> accel_g, gyro, delta_theta, delta_velocity_g;
   std::optional<std::uint64_t> reference, external;

@@ -1,12 +1,12 @@
 #pragma once
 // MicroStrain MIP packets (3DM-GX, CX, CV), sensor data set 0x80.
 //
-// Read: scaled acceleration (sent in g of 9.80665 m/s^2) and rate; else delta angle and delta velocity over
-// the reference delta time or the delta time of the same packet. Device clock, the first that is there:
-// reference time (ns since power-on), GPS time, the older GPS stamp, external time when flagged valid.
-// GPS times carry the week only when it is flagged valid, so they step when the receiver finds it.
-// Axes as the sensor's, z down: at rest level z reads about -9.8.
-// Layout: docs/serial.md. Source: MIP data communication protocol, MicroStrain by HBK.
+// Reads scaled acceleration (sent in g of 9.80665 m/s^2) and rate; otherwise delta angle and delta velocity
+// divided by the reference delta time or delta time of the same packet. Device clock, the first one present:
+// reference time (ns since power-on), GPS time, the older GPS stamp, external time if flagged valid. GPS
+// times contain the week only if it is flagged valid, so they step when the receiver finds it. Axes as the
+// sensor's, z down: at rest and level z reads about -9.8. Layout: docs/serial.md. Source: MIP data
+// communication protocol, MicroStrain by HBK.
 
 #include <cstddef>
 #include <cstdint>
@@ -26,13 +26,13 @@ class Mip {
   static void read(std::span<const std::uint8_t> frame, InertialFrame& content);
 };
 
-/// Writes one packet: begin, fields, finish.
+/// Writes one packet: constructor, field() for each field, finish().
 class MipWriter {
  public:
   MipWriter(std::span<std::uint8_t> out, std::uint8_t descriptor_set);
   /// `data`: the field without its length and descriptor.
   void field(std::uint8_t descriptor, std::span<const std::uint8_t> data);
-  /// The packet's length; 0 when it did not fit into `out` or into a packet.
+  /// The packet's length; 0 if it did not fit into `out` or into a packet.
   std::size_t finish();
 
  private:

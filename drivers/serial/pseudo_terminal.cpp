@@ -26,7 +26,8 @@ DeviceFault PseudoTerminal::open() {
   path_ = name.data();
   other_end_ = ::open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
   termios settings = {};
-  // Raw from the start: an echo of what is sent before a program opens it would come back as its answer.
+  // Raw mode from the start: otherwise bytes sent before a program opens the port would be echoed back as its
+  // answer.
   if (other_end_ < 0 || tcgetattr(other_end_, &settings) != 0) {
     const int error = errno;
     hangUp();

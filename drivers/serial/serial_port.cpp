@@ -26,14 +26,14 @@ Stamp now() {
   return Stamp{static_cast<std::int64_t>(time.tv_sec) * 1'000'000'000 + time.tv_nsec};
 }
 
-/// Rounded up, so that a wait of less than a millisecond is one.
+/// Rounded up, so that a wait below a millisecond is not zero.
 int pollMilliseconds(Duration duration) {
   constexpr std::int64_t kNsPerMs = 1'000'000;
   constexpr std::int64_t kLongest = 60'000;
   return static_cast<int>(std::clamp((duration.ns + kNsPerMs - 1) / kNsPerMs, std::int64_t{0}, kLongest));
 }
 
-/// Whose baud rate is what the wire does: not USB CDC's, nor a pseudo-terminal's.
+/// Whether the baud rate is real: not for USB CDC and pseudo-terminals.
 bool baudMeansSomething(const char* path) {
   std::array<char, PATH_MAX> real = {};
   const std::string_view node = realpath(path, real.data()) != nullptr ? real.data() : path;
@@ -88,7 +88,7 @@ DeviceFault SerialPort::configure() {
   return {};
 }
 
-/// Not all drivers have it: the port works without.
+/// Optional: not all drivers support it.
 void SerialPort::askLowLatency() const {
   serial_struct serial = {};
   if (ioctl(descriptor_, TIOCGSERIAL, &serial) != 0) return;
@@ -98,7 +98,8 @@ void SerialPort::askLowLatency() const {
 
 void SerialPort::close() {
   if (descriptor_ < 0) return;
-  // The lock outlives the file where another one is open, as at the other end of a pseudo-terminal.
+  // Where another descriptor stays open, as at the other end of a pseudo-terminal, the lock would outlive
+  // this one.
   (void)ioctl(descriptor_, TIOCNXCL);
   ::close(std::exchange(descriptor_, -1));
 }
@@ -123,7 +124,8 @@ DeviceFault SerialPort::read(std::span<std::uint8_t> into, std::size_t& count, S
     if (error == EIO || error == ENXIO || error == ENODEV) return unplugged(error);
     return deviceFault(DeviceFaultKind::kFailed, error, "read");
   }
-  // With VMIN and VTIME 0 nothing to read is 0 or EAGAIN, and so is the end of some drivers: ask.
+  // With VMIN and VTIME 0 both "no data" and, on some drivers, a hang-up give 0 or EAGAIN: poll tells them
+  // apart.
   pollfd asked = {descriptor_, POLLIN, 0};
   if (::poll(&asked, 1, 0) > 0 && (asked.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return unplugged(0);
   return {};
@@ -152,7 +154,7 @@ DeviceFault SerialPort::writeSome(std::span<const std::uint8_t> bytes, std::size
 
 DeviceFault SerialPort::write(std::span<const std::uint8_t> bytes, Duration most) {
   const Stamp until = now() + most;
-  // Each turn sends a byte at least, or waits, or ends: bounded by the bytes and the time.
+  // Bounded: each turn sends at least one byte, waits, or ends.
   while (!bytes.empty()) {
     std::size_t taken = 0;
     if (const DeviceFault fault = writeSome(bytes, taken); !fault.ok()) return fault;

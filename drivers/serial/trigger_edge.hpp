@@ -1,6 +1,6 @@
 #pragma once
-// An edge of a trigger or synchronisation line as an inertial sensor saw it: in the clock of its samples,
-// which is what ties frames to samples without the host's clock in between.
+// An edge of a trigger or synchronisation line seen by an inertial sensor, stamped in the clock of its
+// samples. So frames and samples are related without the host's clock.
 
 #include <cstdint>
 #include <optional>
@@ -12,9 +12,9 @@ namespace swiftlet {
 struct TriggerEdge {
   Stamp arrival;               ///< CLOCK_MONOTONIC, of the first byte of the message that reported it
   Stamp device;                ///< of the edge, in the sensor's clock: comparable with ImuReading::device
-  std::uint64_t counter = 0;   ///< of edges, unwrapped: a jump reveals edges that were not reported
+  std::uint64_t counter = 0;   ///< count of edges, unwrapped: a jump means that edges were not reported
   std::uint8_t line = 0;       ///< input number, if there are several
-  std::optional<bool> rising;  ///< empty: not reported; the sensor's settings choose the polarity
+  std::optional<bool> rising;  ///< empty: not reported; the polarity is set in the sensor
 
   bool operator==(const TriggerEdge&) const = default;
 };

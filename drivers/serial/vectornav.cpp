@@ -18,7 +18,7 @@ constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 enum Group : std::size_t { kCommon, kTime, kImu, kGroups };
 
 constexpr std::size_t kFields = 16;
-/// Bytes of each field of each group; 0: unknown, and so the frame's length.
+/// Bytes of each field of each group; 0: unknown, so the frame's length is unknown.
 constexpr std::array<std::array<std::uint8_t, kFields>, kGroups> kSizes = {
     {{8, 8, 8, 12, 16, 12, 24, 12, 12, 24, 20, 28, 2, 4, 8},
      {8, 8, 8, 2, 8, 8, 8, 4, 4, 1},
@@ -26,7 +26,7 @@ constexpr std::array<std::array<std::uint8_t, kFields>, kGroups> kSizes = {
 
 constexpr std::size_t field(Group group, std::size_t bit) { return group * kFields + bit; }
 
-/// The rates and accelerations of one frame, by how much they are to be preferred.
+/// Rates and accelerations of one frame, in order of preference.
 struct Candidates {
   std::optional<Eigen::Vector3d> uncompensated, compensated, from_delta;
   [[nodiscard]] std::optional<Eigen::Vector3d> best() const {
@@ -58,7 +58,7 @@ FrameCheck VectorNav::check(std::span<const std::uint8_t> bytes) {
   }
   const std::size_t length = mask_at + payload + kCrc;
   if (bytes.size() < length) return {FrameVerdict::kIncomplete, 0};
-  // Sent most significant byte first, so that the CRC over itself is zero.
+  // The CRC is sent most significant byte first, so the CRC including it is zero.
   const bool right = crc16Ccitt(0, bytes.subspan(1, length - 1)) == 0;
   return {right ? FrameVerdict::kWhole : FrameVerdict::kBadChecksum, length};
 }
@@ -122,7 +122,7 @@ void VectorNav::read(std::span<const std::uint8_t> frame, InertialFrame& content
         gyro.from_delta = from.vectorF32() * kRadiansPerDegree / *delta_time;
         break;
       case field(kImu, 7):
-        // The time stands in DeltaTheta: without it a velocity is of no use.
+        // The interval is part of DeltaTheta; without it, delta velocity cannot be used.
         if (delta_time)
           accel.from_delta = from.vectorF32() / *delta_time;
         else

@@ -1,11 +1,11 @@
 #pragma once
 // VectorNav binary output (VN-100, VN-200, VN-300): groups Common, Time and IMU.
 //
-// Units as sent are SI but for delta angles, which are degrees. Axes x forward, y right, z down: at rest
-// level z reads about -9.8. Rates and accelerations: UncompGyro and UncompAccel (or Common's Imu) before
-// AngularRate and Accel, whose onboard filter takes a bias out that jumps; else deltas over their time.
-// A trigger wired to SyncIn becomes an edge at TimeStartup - TimeSyncIn, when SyncInCnt and both are sent.
-// Layout: docs/serial.md. Source: VN-100 user manual UM001, chapter 5.
+// Units as sent are SI, except delta angles in degrees. Axes x forward, y right, z down: at rest and level z
+// reads about -9.8. Rates and accelerations: UncompGyro and UncompAccel (or Common's Imu) are preferred to
+// AngularRate and Accel, from which the onboard filter subtracts a bias that jumps; the last choice are
+// deltas divided by their time. A trigger wired to SyncIn becomes an edge at TimeStartup - TimeSyncIn if
+// these and SyncInCnt are sent. Layout: docs/serial.md. Source: VN-100 user manual UM001, chapter 5.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace swiftlet {
 
 class VectorNav {
  public:
-  /// Every field of the three groups at once.
+  /// A frame with every field of the three groups.
   static constexpr std::size_t kLongestFrame = 379;
 
   [[nodiscard]] static FrameCheck check(std::span<const std::uint8_t> bytes);

@@ -15,7 +15,8 @@ constexpr std::size_t kHeader = 4;
 constexpr std::size_t kExtendedHeader = 6;
 constexpr std::int64_t kNsPerTick = 100'000;
 
-/// The low two bits of an item's identifier; the next two name a frame that does not concern us.
+/// Number format in the low two bits of an item's identifier; the next two are the coordinate frame, which is
+/// ignored.
 enum Format : unsigned { kFloat32, kFixed1220, kFixed1632, kFloat64 };
 constexpr unsigned kFormatMask = 0x3;
 constexpr unsigned kTypeMask = 0xFFF0;
@@ -49,7 +50,7 @@ double number(unsigned format, BigFieldReader& from) {
   }
 }
 
-/// Empty when the item's length is not that of three numbers.
+/// Empty if the item's length is not that of three numbers.
 std::optional<Eigen::Vector3d> vector(unsigned format, std::span<const std::uint8_t> data) {
   constexpr std::size_t kSizes[] = {4, 4, 6, 8};
   if (data.size() != 3 * kSizes[format]) return {};
@@ -65,7 +66,7 @@ struct Trigger {
   std::uint16_t frame = 0;
 };
 
-/// Line and polarity (1 rising, 2 falling), fine ticks, frame number.
+/// Reads line, polarity (1 rising, 2 falling), fine ticks and frame number.
 std::optional<Trigger> trigger(std::span<const std::uint8_t> data) {
   constexpr std::size_t kSize = 8;
   if (data.size() != kSize) return {};
@@ -116,7 +117,7 @@ void Xsens::read(std::span<const std::uint8_t> frame, InertialFrame& content) {
     BigFieldReader header(data);
     const unsigned id = header.u16();
     const std::size_t size = header.u8();
-    // A length past the end spoils what follows, not what was read.
+    // An item that extends past the end invalidates only the rest, not the items before it.
     if (size > data.size() - kItemHeader) break;
     const auto item = data.subspan(kItemHeader, size);
     data = data.subspan(kItemHeader + size);
@@ -153,7 +154,7 @@ void Xsens::read(std::span<const std::uint8_t> frame, InertialFrame& content) {
     content.accel = accel_hr;
     content.gyro = gyro_hr;
   }
-  // After the whole message: the trigger may stand before the clock that it is near to.
+  // After the whole message: the trigger item can precede the clock that it refers to.
   for (const Trigger& read : triggers) {
     constexpr std::uint8_t kRising = 1;
     TriggerEdge edge;

@@ -1,11 +1,11 @@
 #pragma once
 // Xsens MTData2 (MTi 1, 10, 100, 600 series).
 //
-// Read: PacketCounter, SampleTimeFine (0.1 ms), Acceleration and RateOfTurn in all four number formats,
-// AccelerationHR and RateOfTurnHR when both stand in one message (without the other two), TriggerIn1 to 3.
-// Not read: high-rate items in messages of their own (each counts as without a sample), DeltaV and DeltaQ,
-// whose period is not sent. Units SI; sensor axes: the axis that points up reads +9.81 at rest.
-// Layout: docs/serial.md. Source: Xsens MT Low-Level Communication Protocol, MT0101P.
+// Reads PacketCounter, SampleTimeFine (0.1 ms), Acceleration and RateOfTurn in all four number formats,
+// AccelerationHR and RateOfTurnHR if both are in one message (without the other two), TriggerIn1 to 3. Not
+// read: high-rate items in separate messages (each counts as without a sample), DeltaV and DeltaQ, whose
+// interval is not sent. Units SI; sensor axes: the axis that points up reads +9.81 at rest. Layout:
+// docs/serial.md. Source: Xsens MT Low-Level Communication Protocol, MT0101P.
 
 #include <cstddef>
 #include <cstdint>
@@ -33,8 +33,8 @@ class Xsens {
   WrappingCounter<std::uint16_t> trigger_frames_;
 };
 
-/// PacketCounter, SampleTimeFine, Acceleration, RateOfTurn as f32, 47 bytes. The clock is rounded down to
-/// 0.1 ms, counter and clock to their widths. Returns the length; 0 when `out` is too short.
+/// PacketCounter, SampleTimeFine, Acceleration, RateOfTurn as f32, 47 bytes. The clock is rounded down to 0.1
+/// ms; counter and clock are cut to their widths. Returns the length; 0 if `out` is too short.
 std::size_t encodeXsens(const ImuReading& reading, std::span<std::uint8_t> out);
 
 }  // namespace swiftlet
