@@ -13,7 +13,7 @@ namespace {
 constexpr int kMostInstants = 24;
 constexpr int kMostPolygon = 16;  // a convex quadrilateral cut by four lines has 8; rounding may add
 
-// Cuts a convex polygon by one side of a box: keeps where `sign` (p[axis] - limit) <= 0.
+// Cuts a convex polygon at one side of a box: keeps the part where `sign` (p[axis] - limit) <= 0.
 int cut(const BoardRaster::Point* in, int count, bool x_axis, float limit, float sign,
         BoardRaster::Point* out) {
   const auto depth = [&](const BoardRaster::Point& p) { return sign * ((x_axis ? p.x : p.y) - limit); };
@@ -34,7 +34,7 @@ int cut(const BoardRaster::Point* in, int count, bool x_axis, float limit, float
 
 float areaOf(const BoardRaster::Point* p, int count) {
   float twice = 0;
-  for (int i = 1; i + 1 < count; ++i) {  // about the first corner, so that nothing large cancels
+  for (int i = 1; i + 1 < count; ++i) {  // relative to the first corner, so that no large numbers cancel
     twice += (p[i].x - p[0].x) * (p[i + 1].y - p[0].y) - (p[i + 1].x - p[0].x) * (p[i].y - p[0].y);
   }
   return 0.5F * std::abs(twice);
@@ -175,7 +175,7 @@ void BoardRenderer::paintRow(const SplineTrajectory& trajectory, double seconds,
     for (std::size_t line = 0; line < 2; ++line) {
       for (std::size_t i = 0; i < columns; ++i) {
         const Eigen::Vector3f ray = R * above[line * columns + i];
-        // Rays that do not come down to the board give points that nothing overlaps.
+        // Rays that do not descend to the board give NaN points, which overlap nothing.
         const float reach = ray.z() < 0 ? -eye.z() / ray.z() : std::numeric_limits<float>::quiet_NaN();
         met[line][i] = {eye.x() + reach * ray.x(), eye.y() + reach * ray.y()};
       }

@@ -1,11 +1,11 @@
 #pragma once
-// Paints a calibration board into what one camera of a rig sees, its edges exact.
+// Paints a calibration board into the image of one camera of a rig, with exact edges.
 //
-// Every pixel's corners are traced to the board's plane, and the areas of white and black inside this
+// The corners of every pixel are traced to the board's plane, and the areas of white and black inside this
 // quadrilateral are computed, not sampled: with a still camera an edge is within 2e-3 px of its projection.
-// Motion during the exposure is a mean over instants at most kPixelsPerInstant apart; a rolling shutter's
-// rows are each seen at their own time. The board hides what is behind it; nothing hides the board. Frames
-// and times as in camera_renderer.hpp. Cost: about 50 ns a pixel and instant. Memory: 12 bytes a pixel.
+// Motion during the exposure is a mean over instants at most kPixelsPerInstant apart; each row of a rolling
+// shutter is seen at its own time. The board hides what is behind it; nothing hides the board. Frames and
+// times as in camera_renderer.hpp. Cost: about 50 ns per pixel and instant. Memory: 12 bytes per pixel.
 
 #include <array>
 #include <vector>
@@ -23,7 +23,7 @@ namespace swiftlet {
 inline constexpr float kPaperWhite = 0.85F;
 inline constexpr float kPaperBlack = 0.05F;
 
-/// Black rectangles, to be asked for the area of black in a small quadrilateral.
+/// Black rectangles with fast queries of the black area inside a small quadrilateral.
 class BoardRaster {
  public:
   explicit BoardRaster(const CalibrationTarget& target);
@@ -32,10 +32,10 @@ class BoardRaster {
     float x = 0;
     float y = 0;
   };
-  using Quad = std::array<Point, 4>;  ///< corners in order round it
+  using Quad = std::array<Point, 4>;  ///< corners in order around it
   struct Shares {
-    float paper = 0;  ///< of the quadrilateral that is on the sheet
-    float black = 0;  ///< of the quadrilateral
+    float paper = 0;  ///< area of the quadrilateral that is on the sheet
+    float black = 0;  ///< black area of the quadrilateral
   };
   [[nodiscard]] Shares shares(const Quad& quad) const;
 
@@ -49,10 +49,10 @@ class BoardRaster {
 
   Box sheet_;
   std::vector<Box> black_;
-  float bin_ = 1;  ///< m: edge of a bin
+  float bin_ = 1;  ///< m, edge of a bin
   int columns_ = 1;
   int rows_ = 1;
-  std::vector<std::vector<Box>> bins_;  ///< what is within a bin's edge of each bin
+  std::vector<std::vector<Box>> bins_;  ///< for each bin, the boxes within one bin's edge of it
 };
 
 class BoardRenderer {
@@ -62,7 +62,7 @@ class BoardRenderer {
   BoardRenderer(const CalibrationTarget& target, const SE3& T_world_board, const CameraModel& camera,
                 const SE3& T_body_cam);
 
-  /// Over `radiance`, an image of the same camera, at mid-exposure time `seconds` (of the middle row).
+  /// Paints over `radiance`, an image of the same camera, at mid-exposure time `seconds` (of the middle row).
   void paint(const SplineTrajectory& trajectory, double seconds, const RenderSettings& settings,
              std::vector<float>& radiance) const;
 
@@ -73,7 +73,7 @@ class BoardRenderer {
 
   BoardRaster raster_;
   SE3 T_board_world_;
-  Eigen::Vector3d centre_;  ///< of the board, in world axes
+  Eigen::Vector3d centre_;  ///< of the board, world axes
   CameraModel camera_;
   SE3 T_body_cam_;
   std::vector<Eigen::Vector3f> corner_;  ///< rays through the pixels' corners, (width + 1) (height + 1)

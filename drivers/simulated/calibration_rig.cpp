@@ -21,18 +21,18 @@ struct ImageSize {
 constexpr std::array<ImageSize, 7> kSizes{
     {{640, 400}, {640, 480}, {752, 480}, {848, 480}, {1024, 768}, {1280, 720}, {1280, 800}}};
 
-// How two lenses of one type differ: focal length, aspect of the pixels, distortion, and the principal point
-// in parts of the width.
+// Spread between two lenses of one type: focal length, aspect of the pixels, distortion, and the principal
+// point relative to the width.
 constexpr double kFocalSpread = 0.005;
 constexpr double kAspectSpread = 0.001;
 constexpr double kDistortionSpread = 0.03;
 constexpr double kCentreSpread = 0.01;
-constexpr double kTangential = 3e-4;    // sigma of p1 and p2
-constexpr double kLeastSlope = 0.3;     // of the distorted over the undistorted radius, anywhere in the image
-constexpr double kMostTheta = 2.4;      // rad: no lens sees further back
-constexpr double kMisalignment = 0.01;  // rad, sigma for each axis of camera 1 against camera 0
-constexpr double kOffAxis = 0.02;       // of the baseline, sigma
-constexpr double kImuMatrix = 0.005;    // sigma of each entry
+constexpr double kTangential = 3e-4;  // sigma of p1 and p2
+constexpr double kLeastSlope = 0.3;   // d (distorted radius) / d (undistorted radius), anywhere in the image
+constexpr double kMostTheta = 2.4;    // rad: largest angle from the axis of any lens
+constexpr double kMisalignment = 0.01;   // rad, sigma per axis of camera 1 relative to camera 0
+constexpr double kOffAxis = 0.02;        // sigma, relative to the baseline
+constexpr double kImuMatrix = 0.005;     // sigma of each entry
 constexpr double kLongestShift = 0.010;  // s
 
 Eigen::Vector3d normalVector(Random& random) {
@@ -55,7 +55,7 @@ double distortedRadius(CameraKind kind, const Eigen::Vector4d& k, double r) {
   return r * (1 + r2 * (k[0] + r2 * (k[1] + r2 * (k[2] + r2 * k[3]))));
 }
 
-// The lens takes every pixel back to a ray, with a slope to spare.
+// Whether the lens maps every pixel to a ray, with a margin of the slope.
 bool validEverywhere(const CameraModel& camera) {
   constexpr int kSteps = 32;
   for (int i = 0; i <= kSteps; ++i) {
@@ -76,14 +76,14 @@ bool validEverywhere(const CameraModel& camera) {
 Eigen::Vector4d drawDistortion(Random& random, CameraKind kind, double edge) {
   Eigen::Vector4d k;
   if (kind == CameraKind::kPinholeRadtan) {
-    // Barrel distortion whose two terms balance as those of real lenses do: monotonic at every radius.
+    // Barrel distortion with two terms balanced as in real lenses: monotonic at every radius.
     k[0] = random.uniform(-0.35, -0.02);
     k[1] = random.uniform(0.7, 1.1) * k[0] * k[0];
     k[2] = kTangential * random.normal();
     k[3] = kTangential * random.normal();
     return k;
   }
-  // Each term by what it does at the edge of the image, `edge` rad from the axis.
+  // Each term by its effect at the edge of the image, `edge` rad from the axis.
   constexpr std::array<double, 4> kAtEdge{0.10, 0.04, 0.02, 0.01};
   double power = 1;
   for (int i = 0; i < 4; ++i) {
@@ -127,7 +127,7 @@ CalibrationRig drawCalibrationRig(std::uint64_t seed, CameraKind lens) {
   const Eigen::Vector3d turn = kMisalignment * normalVector(random);
   const Eigen::Vector3d aside = Eigen::Vector3d::UnitX() + kOffAxis * normalVector(random);
   const SE3 T_cam0_cam1(expSo3(turn), baseline * aside.normalized());
-  Eigen::Vector4d any;  // evenly over the sphere of unit quaternions
+  Eigen::Vector4d any;  // uniform over the unit quaternions
   for (int i = 0; i < 4; ++i) any[i] = random.normal();
   const Eigen::Vector3d direction = normalVector(random).normalized();
   rig.T_body_cam[0] = SE3(Eigen::Quaterniond(any.normalized()), random.uniform(0.01, 0.10) * direction);
@@ -137,7 +137,7 @@ CalibrationRig drawCalibrationRig(std::uint64_t seed, CameraKind lens) {
   const double readout = random.uniform(0.005, 0.025);
   if (rolling) rig.readout = Duration::fromSeconds(readout);
 
-  // Densities as the two data sets give them.
+  // Densities as published with the two data sets.
   if (random.below(2) == 0) {
     drawn.noise.gyro_density = 1.6968e-4;
     drawn.noise.accel_density = 2.0e-3;

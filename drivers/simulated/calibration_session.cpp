@@ -19,26 +19,27 @@ constexpr std::uint64_t kCornerStream = 1000;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kHandKnots = 0.04;     // s: the controls follow the hand's trembling
+constexpr double kHandKnots = 0.04;     // s; short enough to represent the hand's tremor
 constexpr double kSessionMargin = 0.5;  // s of motion beyond both ends, for the spline's support
-constexpr double kImageMargin = 0.1;    // s of IMU before the first image and after the last
+constexpr double kImageMargin = 0.1;    // s of IMU data before the first image and after the last
 constexpr double kRestRamp = 1.0;       // s from motion to rest
 constexpr double kMostSlant = 80;       // deg between the line of sight and the board's normal
 
-// What the person does. Slow: around the board, to and fro, and where the board stands in the image.
+// The person's motion. Slow part: around the board, nearer and farther, and the board's position in the
+// image.
 constexpr double kRoundLow = 0.04;       // Hz
 constexpr double kRoundHigh = 0.12;      // Hz
 constexpr double kTilt = 32 * kRadians;  // about each axis: 45 degrees together
 constexpr double kRoll = 40 * kRadians;
 constexpr double kPlace = 0.7;  // of half the image
 constexpr double kFarOverNear = 2.2;
-// Quick: about and along the three axes of the camera, one after the other most.
+// Fast part: rotation about and translation along the three axes of the camera, each dominant in turn.
 constexpr double kSwingLow = 0.5;   // Hz
 constexpr double kSwingHigh = 1.1;  // Hz
 constexpr double kSwingTurn = 14 * kRadians;
 constexpr double kSwingShift = 0.10;  // m
-constexpr double kSwingRound = 20;    // s in which each axis had its time
-// The hand.
+constexpr double kSwingRound = 20;    // s in which each axis is dominant once
+// Tremor of the hand.
 constexpr double kTrembleLow = 1.5;      // Hz
 constexpr double kTrembleHigh = 4;       // Hz
 constexpr double kTrembleTurn = 1.5e-3;  // rad
@@ -88,7 +89,7 @@ class Wave3 {
   Wave z_;
 };
 
-// Each axis has its time in turn.
+// Weights of the three axes: each is dominant in turn.
 Eigen::Vector3d emphasis(double t) {
   Eigen::Vector3d share;
   for (int axis = 0; axis < 3; ++axis) {
@@ -116,8 +117,8 @@ class HandMotion {
     const Eigen::Vector3d extent = target.corner(target.cornerCount() - 1 - (target.hasTags() ? 1 : 0));
     centre_ = 0.5 * extent;
     const double half_width = 0.5 * extent.head<2>().maxCoeff();
-    // Nearest: the board takes most of the image's width, is no nearer than 0.4 of its own width, and both
-    // cameras see it.
+    // Smallest distance: the board fills most of the image's width, the distance is at least 0.4 of the
+    // board's width, and both cameras see it.
     const double middle = 0.5 * (lens_.height() - 1);
     const Eigen::Vector3d left = rayAt({0, middle});
     const Eigen::Vector3d right = rayAt({lens_.width() - 1.0, middle});
@@ -127,7 +128,7 @@ class HandMotion {
   }
 
   SE3 operator()(double t) const {
-    const double around = turning_ == Turning::kNone ? 0.5 : 1;  // else the board leaves the image
+    const double around = turning_ == Turning::kNone ? 0.5 : 1;  // otherwise the board leaves the image
     const Eigen::Quaterniond side = expSo3(around * kTilt * tilt_y_(t) * Eigen::Vector3d::UnitY()) *
                                     expSo3(around * kTilt * tilt_x_(t) * Eigen::Vector3d::UnitX());
     const double distance = near_ * std::pow(kFarOverNear, 0.5 * (1 + distance_(t)));
@@ -163,7 +164,7 @@ class HandMotion {
   double near_ = 0;
 };
 
-// Turns each pose about its z axis, so that nothing is left of the rate about it.
+// Turns each pose about its z axis such that no angular rate about it remains.
 void takeRollAway(std::vector<SE3>& poses) {
   double angle = 0;
   Eigen::Quaterniond before = poses.front().rotation;
@@ -237,7 +238,7 @@ bool CalibrationSession::see(double seconds, std::size_t camera, const Eigen::Ve
   const CameraModel& lens = rig_.rig.camera[camera];
   const double most_slant = std::cos(kMostSlant * kRadians);
   double row_time = 0;
-  constexpr int kMostRounds = 30;       // each leaves some hundredth of the error before it
+  constexpr int kMostRounds = 30;       // each reduces the error to some hundredths
   constexpr double kExactTime = 1e-13;  // s
   for (int round = 0; round < kMostRounds; ++round) {
     const SE3 T_world_cam = trajectory_.pose(seconds + row_time) * rig_.rig.T_body_cam[camera];

@@ -12,13 +12,13 @@ namespace swiftlet {
 namespace {
 
 constexpr int kMaxSamples = 8;
-constexpr double kPixelsPerSample = 1.0;  // px of motion that one sample may leave unsampled
+constexpr double kPixelsPerSample = 1.0;  // px of motion between samples
 constexpr float kFullScale = 215.0F;      // stored texture value of radiance 1
-constexpr float kMinCosine = 0.08F;       // footprints of grazing rays grow no further
+constexpr float kMinCosine = 0.08F;       // limits the footprint of grazing rays
 
 using Sample = CameraRenderer::Sample;
 
-// Places that are spread over the pixel and have zero mean, so that the image is not shifted.
+// Positions spread over the pixel with zero mean, so that the image is not shifted.
 std::vector<Sample> samplePattern(int count) {
   constexpr std::array<std::array<float, 2>, 4> kRotatedGrid{
       {{-0.125F, -0.375F}, {0.375F, -0.125F}, {-0.375F, 0.125F}, {0.125F, 0.375F}}};
@@ -32,7 +32,7 @@ std::vector<Sample> samplePattern(int count) {
   return samples;
 }
 
-// log2 to 0.06: the level only has to be near.
+// log2 with an error of 0.06: the level need not be exact.
 float roughLog2(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   const float mantissa = static_cast<float>(bits & 0x7FFFFFU) * 0x1p-23F;
@@ -42,7 +42,7 @@ float roughLog2(float value) {
 struct Shading {
   const TexturedWorld* world = nullptr;
   float pixel_angle = 0;
-  float level_shift = 0;  // spread over the samples, so that their mean blends two levels
+  float level_shift = 0;  // different for each sample, so that their mean blends two levels
 };
 
 void shadeTile(const Shading& shading, const View& view, const Tile& tile,
@@ -80,7 +80,7 @@ void turnRows(const CameraRenderer::RowTurns& turns, Tile& tile) {
 
 }  // namespace
 
-// One camera's place at each sample's instant about one time: of all rows, or of a band of them.
+// The camera's pose at each sample's instant around one time, for all rows or a band of them.
 struct CameraRenderer::Instant {
   std::vector<View> views;
   View middle;
@@ -95,8 +95,8 @@ CameraRenderer::Instant CameraRenderer::instantAt(const SplineTrajectory& trajec
                                                   double exposure, std::span<const Sample> samples) const {
   const MotionState motion = trajectory.at(seconds);
   const double shift = speedOf(motion) * exposure;
-  // The same patches in every view, so that one list of candidates serves all: slack keeps those
-  // that turn their visible side to the camera during the exposure only.
+  // All views keep the same patches, so that one list of candidates serves them all: `slack` also keeps
+  // patches whose visible side faces the camera only during part of the exposure.
   const double slack = shift + 1e-3;
   Instant instant{{},
                   View(world_->world(), motion.T_world_body * T_body_cam_, slack),
@@ -122,7 +122,7 @@ void CameraRenderer::renderRows(const Instant& instant, std::span<const Sample> 
   std::vector<std::int32_t> candidates;
   for (int column = 0; column < rays_.width(); column += kTileSide) {
     patchesInTile(instant.middle, rays_, column, row, instant.turn, instant.slack, candidates);
-    // From places in the middle view to places in views that keep every patch.
+    // Convert indices into the middle view to indices into the views with all patches.
     for (std::int32_t& id : candidates) {
       id = static_cast<std::int32_t>(instant.middle.patches()[static_cast<std::size_t>(id)].index);
     }
@@ -131,7 +131,7 @@ void CameraRenderer::renderRows(const Instant& instant, std::span<const Sample> 
       loadRays(rays_, column, row, samples[s].dx, samples[s].dy, tile);
       if (turns != nullptr) turnRows(*turns, tile);
       traceTile(instant.views[s], candidates, tile);
-      // A sample covers a part of the pixel only: half a level finer than the pixel's footprint.
+      // A sample covers only a part of the pixel: use half a level finer than the pixel's footprint.
       const float blend = (static_cast<float>(s % 4) + 0.5F) / 4.0F;
       shadeTile({world_, rays_.pixelAngle(), blend - 0.5F}, instant.views[s], tile, sum);
     }
@@ -147,7 +147,7 @@ void CameraRenderer::renderRows(const Instant& instant, std::span<const Sample> 
 void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds,
                                  const RenderSettings& settings, std::vector<float>& radiance) const {
   const MotionState motion = trajectory.at(seconds);
-  // Something at a metre's distance moves by this much on top of the turn.
+  // Motion of an object at one metre, in addition to the rotation.
   const double moved = (motion.omega_body.norm() + speedOf(motion)) * settings.exposure * camera_.focal();
   const int count = settings.samples <= 1 ? 1 : moved > 4 * kPixelsPerSample ? kMaxSamples : 4;
   const std::vector<Sample> samples = samplePattern(count);

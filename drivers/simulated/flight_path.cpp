@@ -11,10 +11,10 @@ namespace swiftlet {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kKnotSpacing = 0.1;       // s; the controls follow oscillations up to about 2 Hz
+constexpr double kKnotSpacing = 0.1;       // s; represents oscillations up to about 2 Hz
 constexpr double kPathStep = 0.02;         // m between samples of the rounded tour
 constexpr double kRamp = 1.0;              // s from motion to rest
-constexpr double kHeadingAhead = 0.5;      // m: the airframe looks where it will be
+constexpr double kHeadingAhead = 0.5;      // m: the airframe looks to where it will be
 constexpr double kHeadingSmooth = 0.7;     // s at the mean speed, sigma of the heading's low pass
 constexpr double kClimb = 2.5;             // s of take-off
 constexpr double kGroundClearance = 0.12;  // m of the body above the floor when landed
@@ -25,7 +25,7 @@ double smoothStep(double x) {  // 0 to 1 with vanishing first and second derivat
   return x * x * x * (x * (6.0 * x - 15.0) + 10.0);
 }
 
-// One slow oscillation per axis: a sum of sines whose frequencies have no common period.
+// One slow oscillation per axis: a sum of sines without a common period.
 struct Oscillation {
   static constexpr std::size_t kTerms = 3;
   std::array<double, kTerms> amplitude{};
@@ -35,7 +35,7 @@ struct Oscillation {
   Oscillation(Random& random, double size, double low_hz, double high_hz) {
     for (std::size_t i = 0; i < kTerms; ++i) {
       omega[i] = kTwoPi * random.uniform(low_hz, high_hz);
-      // Equal peak speeds: slower terms swing wider.
+      // Equal peak speeds: slower terms have larger amplitudes.
       amplitude[i] = size * low_hz * kTwoPi / omega[i] / std::sqrt(static_cast<double>(kTerms));
       phase[i] = random.uniform(0.0, kTwoPi);
     }
@@ -47,7 +47,7 @@ struct Oscillation {
   }
 };
 
-// The rounded tour by arc length.
+// The rounded tour, parametrized by arc length.
 class RoundedTour {
  public:
   RoundedTour(const std::vector<Eigen::Vector3d>& waypoints, double heading_sigma) : waypoints_(waypoints) {
@@ -68,7 +68,7 @@ class RoundedTour {
     }
     smoothHeading(heading_sigma);
   }
-  // Linear between samples 2 cm apart: the trajectory's own spline smooths the corners away.
+  // Linear between samples 2 cm apart: the trajectory's spline smooths the corners.
   [[nodiscard]] Eigen::Vector3d operator()(double s) const {
     const auto n = static_cast<double>(points_.size());
     double place = std::fmod(s / kPathStep, n);
@@ -78,7 +78,8 @@ class RoundedTour {
     return points_[index] + share * (points_[(index + 1) % points_.size()] - points_[index]);
   }
   [[nodiscard]] double length() const { return kPathStep * static_cast<double>(points_.size()); }
-  // Where the airframe looks [rad], unwrapped: a function of the way alone, so it rests with it.
+  // Heading of the airframe [rad], unwrapped: a function of arc length only, so it rests when the position
+  // rests.
   [[nodiscard]] double heading(double s) const {
     const double n = static_cast<double>(points_.size());
     const double laps = std::floor(s / kPathStep / n);
@@ -98,7 +99,8 @@ class RoundedTour {
             (3 * v * v * v - 6 * v * v + 4) * waypoints_[(i + 2) % n] + u * u * u * waypoints_[(i + 3) % n]) /
            6.0;
   }
-  // Direction half a metre ahead, unwrapped along one lap, then a Gaussian along the way.
+  // Direction to the point half a metre ahead, unwrapped along one lap, smoothed by a Gaussian along the
+  // path.
   void smoothHeading(double sigma) {
     const auto n = static_cast<std::ptrdiff_t>(points_.size());
     const auto ahead = static_cast<std::ptrdiff_t>(kHeadingAhead / kPathStep);
@@ -129,11 +131,11 @@ class RoundedTour {
 
   std::vector<Eigen::Vector3d> waypoints_;
   std::vector<Eigen::Vector3d> points_;
-  std::vector<double> heading_;  // one more than points_: the last is the first a lap later
-  double winding_ = 0;           // rad a lap
+  std::vector<double> heading_;  // one more than points_: the last is the first one lap later
+  double winding_ = 0;           // rad per lap
 };
 
-// Share of full motion (1) left at time t; `hover` gives the share of hovering instead.
+// Share of full motion (1) at time t; `hover` receives the share of hovering.
 double activityAt(const FlightSettings& settings, double t, double* hover) {
   double activity = 1;
   double hovering = 0;
@@ -153,8 +155,8 @@ struct PathSample {
   double heading = 0;  // rad, unwrapped
 };
 
-// Where the airframe is and looks, every kKnotSpacing from -kMargin on. `activity_time` runs with
-// the activity, so that everything that oscillates stands still at rest.
+// Position and heading of the airframe every kKnotSpacing from -kMargin on. `activity_time` advances with the
+// activity, so that all oscillations stop at rest.
 std::vector<PathSample> samplePath(const Tour& tour, const FlightSettings& settings) {
   Random random(settings.seed, 11);
   const RoundedTour path(tour.waypoints, kHeadingSmooth * std::max(settings.speed, 0.2));
@@ -197,7 +199,7 @@ std::vector<PathSample> samplePath(const Tour& tour, const FlightSettings& setti
     for (int k = 0; k < kSubsteps; ++k) {
       const double middle = t + (k + 0.5) * step;
       const double activity = activityAt(settings, middle, &hover);
-      // On the ground the take-off comes first: forward motion grows with the lift.
+      // The take-off from the ground comes first: forward motion grows with height.
       const bool climbing = settings.start_on_ground && settings.rest_at_start > 0;
       const double lift = climbing ? smoothStep(climb_time / kClimb) : 1.0;
       climb_time += step * activity;

@@ -23,8 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kOrigin = "simulated";
-constexpr double kMaxDepth = 10.0;      // m; what lies further counts as not seen
-constexpr double kPinholeFocal = 0.94;  // ideal camera's focal length over a narrow lens's own
+constexpr double kMaxDepth = 10.0;      // m; farther surfaces count as not seen
+constexpr double kPinholeFocal = 0.94;  // focal length of the ideal camera relative to that of a narrow lens
 constexpr double kWideFocal = 0.45;  // over the image width, for lenses wider than a pinhole's useful field
 constexpr double kObservedCell = 0.03;  // m
 constexpr int kObservedStride = 2;      // every n-th pixel of every n-th row
@@ -41,7 +41,7 @@ CameraModel depthCamera(const CameraModel& camera) {
           Eigen::Vector4d::Zero()};
 }
 
-// Depth, labels and the points they show, at every n-th frame.
+// Writes depth, labels and the points they show, at every n-th frame.
 class TruthWriter {
  public:
   TruthWriter(const SimulatedFlight& flight, const TexturedWorld& world, const fs::path& folder)
@@ -150,7 +150,7 @@ void writeImages(const SimulatedFlight& flight, const fs::path& folder, const Si
         } else {
           writePng8(path, grey[c], camera.width(), camera.height());
         }
-      } catch (const std::runtime_error& error) {  // must not leave a thread
+      } catch (const std::runtime_error& error) {  // must not leave the thread
         failed[c] = error.what();
       }
     });
@@ -167,7 +167,7 @@ void writeImages(const SimulatedFlight& flight, const fs::path& folder, const Si
   if (truth != nullptr) truth->finish();
 }
 
-// Takes out what the flight's faults hide; false when no camera took an image at all.
+// Removes what the flight's faults hide; false if no camera took an image.
 bool applyFaults(const SimulatedFlight& flight, double seconds, TrackedFrame& frame) {
   bool any_image = false;
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
@@ -197,7 +197,7 @@ void makeTracks(const SimulatedFlight& flight, const TrackSink& sink, const Simu
   }
 }
 
-// The list of images that the folder already has; empty without one.
+// The image list that already exists in the folder; empty if there is none.
 std::string imageListIn(const fs::path& folder) {
   std::error_code error;
   for (const char* camera : {"cam0", "cam1"}) {
@@ -263,7 +263,7 @@ void writeFlight(const SimulatedFlight& flight, const fs::path& folder) {
   writeText(folder / "truth/simulation.yaml", simulationYaml(flight));
 }
 
-// Makes the flight, the files that both kinds of output share, and the rest by `write`.
+// Creates the flight, writes the files common to both kinds of output, and calls `write` for the rest.
 template <typename Write>
 Status simulateWith(const SimulationSettings& settings, const fs::path& folder, std::string* message,
                     const Write& write) {

@@ -9,10 +9,10 @@
 //   mav0/labels0           8 bit PNG in cam0's own (distorted) geometry; labels.csv: id, name
 //   truth/mesh.ply         the surface, with labels; truth/observed.ply: its points that a depth
 //                          image saw within 10 m, one per 3 cm cell
-//   truth/cam0.yaml ...    the true calibration, where the one given was turned or shifted
-//   truth/simulation.yaml  what was asked for
-// Stamps are whole nanoseconds. Depth and label images carry the true stamp of their instant plus
-// the image stamp offset, as the images do.
+//   truth/cam0.yaml ...    the true calibration, if the given one was rotated or shifted
+//   truth/simulation.yaml  the settings
+// Stamps are whole nanoseconds. Depth and label images carry the true stamp of their instant plus the image
+// stamp offset, like the images.
 
 #include <functional>
 #include <string>
@@ -23,21 +23,21 @@
 
 namespace swiftlet {
 
-/// Called after each image (or frame of tracks) with how many are done of how many.
+/// Called after each image (or frame of tracks) with the number done and the total.
 using SimulationProgress = std::function<void(int done, int total)>;
 
-/// Called with each frame of feature tracks. A failure to write it is thrown (std::exception).
+/// Called with each frame of feature tracks. Throw std::exception if it cannot be written.
 using TrackSink = std::function<void(const TrackedFrame& frame)>;
 
-/// Makes the flight and writes it; existing files of the same names are replaced. kInvalidInput for
-/// a bad setting, kFailed when a file cannot be read or written; `message`, when given, then names
-/// the setting or the file. Cost: 10 pairs of 752 x 480 a second on two idle cores with JPEG.
+/// Simulates the flight and writes it; existing files of the same names are replaced. kInvalidInput for an
+/// invalid setting, kFailed if a file cannot be read or written; `message`, if given, names the setting or
+/// the file. Cost: 10 pairs of 752 x 480 per second on two idle cores with JPEG.
 Status simulateToFolder(const SimulationSettings& settings, const std::string& folder,
                         const SimulationProgress& progress = {}, std::string* message = nullptr);
 
-/// The same without rendering: feature tracks go to `sink`, whose file format is another room's, and
-/// images, depth and labels are left out. Frames in which no camera took an image are left out too.
-/// kFailed as well when the folder holds images, which would be those of another flight.
+/// The same without rendering: feature tracks go to `sink`, which chooses the file format; images, depth and
+/// labels are not written. Frames in which no camera took an image are omitted. Also kFailed if the folder
+/// holds images, since these would be from another flight.
 Status simulateTracksToFolder(const SimulationSettings& settings, const std::string& folder,
                               const TrackSink& sink, const SimulationProgress& progress = {},
                               std::string* message = nullptr);

@@ -1,6 +1,6 @@
 #pragma once
-// Things to put into a world, made of its simple surfaces. All stand upright, turned about z by
-// `yaw` [rad]; positions are of the foot's centre; sizes are x, y, z extents before the turn [m].
+// Objects for a world, made of its simple surfaces. All stand upright, rotated about z by `yaw` [rad];
+// positions are those of the base's centre; sizes are x, y, z extents before the rotation [m].
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace swiftlet {
 
-/// How a surface looks and what it is.
+/// Appearance and class of a surface.
 struct Finish {
   Material material = Material::kWood;
   Label label = Label::kBox;
@@ -22,7 +22,7 @@ struct Place {
 };
 
 void addBox(World& world, const Place& place, const Eigen::Vector3d& size, const Finish& finish);
-/// The six sides get `finish`, the one towards +y (before the turn) gets `front`.
+/// The side towards +y (before the rotation) gets `front`, the others `finish`.
 void addBox(World& world, const Place& place, const Eigen::Vector3d& size, const Finish& finish,
             const Finish& front);
 void addUprightCylinder(World& world, const Place& place, double radius, double height, const Finish& finish,
@@ -31,7 +31,7 @@ void addTable(World& world, const Place& place, const Eigen::Vector3d& size, std
 void addChair(World& world, const Place& place, std::uint32_t seed);
 void addShelf(World& world, const Place& place, const Eigen::Vector3d& size, std::uint32_t seed);
 void addMachine(World& world, const Place& place, const Eigen::Vector3d& size, std::uint32_t seed);
-/// One to three cartons on each other.
+/// A stack of one to three cartons.
 void addStack(World& world, const Place& place, double edge, int count, std::uint32_t seed);
 
 }  // namespace swiftlet

@@ -16,7 +16,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kMaxGap = 0.5;  // s between poses that may still be bridged
+constexpr double kMaxGap = 0.5;  // s, largest gap between poses that is bridged
 
 struct Row {
   double t = 0;  // s since the first row

@@ -14,7 +14,7 @@ namespace {
 constexpr double kWhite = 255.0;
 constexpr std::uint64_t kNoiseStream = 71;
 
-// Normal numbers drawn once: a random place in the table costs a tenth of a fresh one.
+// Normal random numbers drawn once: a random position in the table costs a tenth of a new number.
 class NormalTable {
  public:
   static constexpr std::uint32_t kSize = 1U << 14U;
@@ -47,7 +47,7 @@ void GainControl::start(double mean_radiance) {
 }
 
 void GainControl::update(double mean, double seconds) {
-  // A black image asks for no more than eight times the gain at once.
+  // Limit one step to a factor of eight, for instance for a black image.
   const double ratio = std::clamp(settings_.target_mean / std::max(mean, 1.0), 0.125, 8.0);
   const double share = 1.0 - std::exp(-seconds / settings_.settle_time);
   gain_ = std::clamp(gain_ * std::pow(ratio, share), 0.01, settings_.max_gain);

@@ -1,13 +1,14 @@
 #pragma once
-// What an IMU on a trajectory reads: exact rate and specific force, then the noise model's errors.
+// Simulates the readings of an IMU on a trajectory: exact rate and specific force plus the errors of the
+// noise model.
 //
 // reading = M truth + bias + white noise + vibration, then clipped at the saturation. M: scale errors and
 // misalignment, one matrix for each sensor.
 // White noise of density n has standard deviation n sqrt(rate) a sample; biases are random walks
 // with steps of density sqrt(1 / rate) (Woodman, UCAM-CL-TR-696, 2007; Kalibr's IMU noise model).
 // Specific force: R_body_world (a_world + (0, 0, gravity)). SI units, body axes.
-// Everything follows from the seed; each error source has its own stream, so that switching one
-// off leaves the others as they were.
+// Everything follows from the seed. Each error source has its own random stream, so disabling one does not
+// change the others.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -47,8 +48,8 @@ struct ImuSimulationSettings {
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
   Vibration vibration;
-  std::vector<TimeSpan> gaps;  ///< no samples here
-  /// Spans in which the sensor clips at these lower limits.
+  std::vector<TimeSpan> gaps;  ///< spans without samples
+  /// Spans in which the sensor clips at the limits below.
   std::vector<TimeSpan> saturations;
   double low_gyro_limit = 1.0;    ///< rad/s
   double low_accel_limit = 12.0;  ///< m/s^2
@@ -57,13 +58,13 @@ struct ImuSimulationSettings {
 
 struct SimulatedImu {
   std::vector<ImuSample> samples;
-  /// True biases at every step k / rate, those inside gaps included.
+  /// True biases at every step k / rate, including those in gaps.
   std::vector<Eigen::Vector3d> bias_gyro;
   std::vector<Eigen::Vector3d> bias_accel;
 };
 
-/// Reading k has stamp `zero` + round(k 1e9 / rate) ns, at time k / rate of the trajectory, from
-/// time 0 up to and including `duration`.
+/// Reading k has the stamp `zero` + round(k 1e9 / rate) ns, at trajectory time k / rate, for times from 0 to
+/// `duration` inclusive.
 SimulatedImu simulateImu(const SplineTrajectory& trajectory, const ImuSimulationSettings& settings,
                          Stamp zero, double duration);
 

@@ -6,10 +6,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kAmbient = 0.45;       // share of light that comes from everywhere
-constexpr double kFromFloor = 0.2;      // and from the lit floor, onto what faces down
-constexpr double kLampStrength = 0.55;  // so that the floor below a lamp of average height gets about 1
-constexpr double kSlack = 0.02;         // m: a point does not shade itself
+constexpr double kAmbient = 0.45;       // share of ambient light
+constexpr double kFromFloor = 0.2;      // share reflected from the lit floor onto surfaces that face down
+constexpr double kLampStrength = 0.55;  // gives about 1 on the floor below a lamp of average height
+constexpr double kSlack = 0.02;         // m: a point must not shade itself
 constexpr int kMaxCells = 400;
 
 }  // namespace
@@ -23,7 +23,7 @@ LightGrid::LightGrid(const World& world, std::size_t index, double spacing) {
   value_.reserve(static_cast<std::size_t>(columns_ * rows_));
   for (int j = 0; j < rows_; ++j) {
     for (int i = 0; i < columns_; ++i) {
-      // Grid points on the very edge would touch the neighbouring surface: draw them in a little.
+      // Grid points exactly on the edge would touch the neighbouring surface: move them inwards.
       const double u =
           std::clamp(i / static_cast<double>(per_u_), kSlack, std::max(kSlack, patch.u_length - kSlack));
       const double v =

@@ -1,6 +1,6 @@
 #pragma once
-// Light that falls on a surface: every lamp of its zone with the shadows of all things, and an
-// even share for what walls reflect. Baked on a coarse grid over the surface and interpolated.
+// Light on a surface: every lamp of its zone with the shadows of all objects, plus a constant share for
+// reflections from walls. Computed once on a coarse grid over the surface and interpolated.
 
 #include <vector>
 

@@ -22,7 +22,7 @@ float cellValue(int x, int y, std::uint32_t seed) {
          0x1p-32F;
 }
 
-// Fractal noise, tiled, mean 0 and standard deviation about 1: made once, sampled everywhere.
+// Fractal noise, tiled, mean 0 and standard deviation about 1: computed once, sampled everywhere.
 class NoiseTile {
  public:
   static constexpr int kSize = 1024;
@@ -30,7 +30,7 @@ class NoiseTile {
     float amplitude = 1;
     for (int period = 256; period >= 2; period /= 2) {
       addOctave(period, amplitude);
-      amplitude *= 0.72F;  // steeper than 1/f pictures get too flat to track, shallower is sand
+      amplitude *= 0.72F;  // steeper than 1/f is too flat to track, shallower looks like sand
     }
     double square = 0;
     for (const float v : value_) square += static_cast<double>(v) * static_cast<double>(v);
@@ -84,10 +84,10 @@ const NoiseTile& noiseTile() {
   return tile;
 }
 
-// What a painter knows while it colours one texel.
+// State of a painter while it colours one texel.
 struct Brush {
   std::uint32_t seed = 0;
-  float shift_x = 0;  // where in the noise tile this patch lies
+  float shift_x = 0;  // position of this patch in the noise tile
   float shift_y = 0;
   [[nodiscard]] float noise(float u, float v, float per_metre) const {
     return noiseTile().at(u * per_metre + shift_x, v * per_metre + shift_y);
@@ -100,7 +100,7 @@ struct Brush {
 struct CellPlace {
   int x = 0;
   int y = 0;
-  float in_x = 0;  // m from the cell's low edges
+  float in_x = 0;  // m from the cell's lower edges
   float in_y = 0;
 };
 CellPlace cellAt(float u, float v, float width, float height, float stagger) {
@@ -117,7 +117,8 @@ bool nearEdge(const CellPlace& place, float width, float height, float margin) {
          place.in_y > height - margin;
 }
 
-// Round spots at random places of a grid: distance to the cell's spot over its radius; 1 and more is outside.
+// Round spots at random positions of a grid: distance to the cell's spot relative to its radius; 1 or more is
+// outside.
 float spot(const Brush& brush, float u, float v, float pitch, float radius_low, float radius_high,
            float share, std::uint32_t salt) {
   const CellPlace place = cellAt(u, v, pitch, pitch, 0);
@@ -264,7 +265,7 @@ class Canvas {
       texel = low + (high - low) * static_cast<float>((x - u0) / (u1 - u0));
     });
   }
-  // Lines of print: words of strokes.
+  // Lines of print: words made of strokes.
   void text(double u0, double v0, double u1, double v1, double size, float value, Random& random) {
     for (double v = v0; v + size < v1; v += 1.7 * size) {
       double u = u0;
@@ -351,7 +352,7 @@ void drawCarton(Canvas& canvas, double w, double h, Random& random) {
   if (random.uniform() < 0.5) canvas.disc(0.8 * w, 0.8 * h, 0.08 * std::min(w, h), 0.1F);
 }
 
-// Odds and ends on plain walls: sockets, switches, notes, pipes' shadows.
+// Small objects on plain walls: sockets, switches, notes, shadows of pipes.
 void drawWallThings(Canvas& canvas, double w, double h, Random& random) {
   const int things = static_cast<int>(w * h * 0.35);
   for (int i = 0; i < things; ++i) {

@@ -1,6 +1,6 @@
 #pragma once
-// Paints materials: reflectance by surface coordinates, rich where real surfaces are (print,
-// bricks, books), poor where they are poor (plaster, lamps), repeated where they repeat.
+// Paints materials as reflectance by surface coordinates: detailed like real surfaces (print, bricks, books),
+// plain where those are plain (plaster, lamps), and repetitive where those repeat.
 //
 // Source of the fractal noise: value noise summed over octaves (Ebert et al., "Texturing and
 // Modeling", 2003, chapter 2).

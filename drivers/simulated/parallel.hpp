@@ -1,5 +1,5 @@
 #pragma once
-// A bounded loop over a few threads. What iteration i computes must not depend on who runs it.
+// A parallel loop with a bounded number of threads. The result of iteration i must not depend on its thread.
 
 #include <atomic>
 #include <thread>

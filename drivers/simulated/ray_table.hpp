@@ -1,10 +1,10 @@
 #pragma once
-// Viewing rays of every pixel of a lens, once unprojected.
+// Viewing rays of every pixel of a lens, unprojected once.
 //
-// Rays are unit vectors in the camera frame at integer pixels (x, y), x in [0, width], y in
-// [0, height]: one more than the image each way, so that a ray inside a pixel is interpolated from
-// its neighbours (to better than 1e-3 px). Where the lens has no inverse the ray is NaN: it hits
-// nothing and the pixel stays dark. Memory: 12 bytes a pixel.
+// Rays are unit vectors in the camera frame at integer pixels (x, y), x in [0, width], y in [0, height]: one
+// more than the image in each direction, so that a ray inside a pixel can be interpolated from its neighbours
+// (to better than 1e-3 px). Where the lens has no inverse the ray is NaN: it hits nothing and the pixel stays
+// dark. Memory: 12 bytes per pixel.
 
 #include <Eigen/Core>
 #include <vector>
@@ -19,7 +19,7 @@ class RayTable {
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
-  /// Component rows: width() + 1 values each.
+  /// Rows of one component: width() + 1 values each.
   [[nodiscard]] const float* x(int row) const { return x_.data() + offset(row); }
   [[nodiscard]] const float* y(int row) const { return y_.data() + offset(row); }
   [[nodiscard]] const float* z(int row) const { return z_.data() + offset(row); }

@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-// A camera in the airframe: `aside` metres to the left, looking forward and `down` rad downward.
+// A camera mounted `aside` metres to the left, looking forward and `down` rad downward.
 SE3 forwardCamera(double aside, double down) {
   Eigen::Matrix3d R_flu_cam;
   R_flu_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // columns: right, down, forward
@@ -41,7 +41,7 @@ MountedRig pairInAirframe(const CameraModel& left, const CameraModel& right, dou
   mounted.rig.camera_count = 2;
   mounted.rig.camera = {left, right};
   mounted.rig.T_body_cam = {forwardCamera(0.5 * baseline, down), forwardCamera(-0.5 * baseline, down)};
-  // No two cameras are mounted quite parallel.
+  // Real cameras are never mounted exactly parallel.
   mounted.rig.T_body_cam[1].rotation = mounted.rig.T_body_cam[1].rotation * expSo3({0.004, -0.006, 0.003});
   return mounted;
 }

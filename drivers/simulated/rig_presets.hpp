@@ -1,5 +1,5 @@
 #pragma once
-// Camera rigs to fly with.
+// Camera rigs for simulated flights.
 
 #include <optional>
 #include <string>
@@ -23,12 +23,12 @@ inline bool isRandom(RigKind kind) {
 const char* rigName(RigKind kind);
 std::optional<RigKind> rigNamed(const std::string& name);
 
-/// The rig with its body axes (the IMU's) as mounted in the airframe (forward-left-up).
+/// A rig, and the orientation of its body axes (the IMU's) in the airframe (forward-left-up).
 struct MountedRig {
   Rig rig;
   Eigen::Quaterniond R_flu_body = Eigen::Quaterniond::Identity();
 };
-/// Of a kind that is not random.
+/// For kinds that are not random.
 MountedRig makeRig(RigKind kind);
 
 /// Mounted so that camera 0 looks forward and stands upright.

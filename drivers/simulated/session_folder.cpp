@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kSessionOrigin = "simulated";
 
-// Blurs by a Gaussian of sigma `sigma` px along both directions; what is beyond the edge is as the edge.
+// Gaussian blur of `sigma` px in both directions; pixels beyond the edge repeat the edge.
 void blurBy(double sigma, int width, int height, int threads, std::vector<float>& image) {
   if (sigma <= 0) return;
   const int reach = std::max(1, static_cast<int>(std::ceil(3.5 * sigma)));
@@ -207,7 +207,7 @@ SessionCamera::SessionCamera(const CalibrationSession& session, const TexturedWo
 
 void SessionCamera::render(int k, std::vector<float>& radiance) const {
   RenderSettings background = render_;
-  background.samples = 1;  // nothing is measured there
+  background.samples = 1;  // the background is not measured
   const double seconds = session_->imageTime(k);
   room_.renderImage(session_->trajectory(), seconds, background, radiance);
   board_.paint(session_->trajectory(), seconds, render_, radiance);

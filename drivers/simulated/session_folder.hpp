@@ -1,14 +1,14 @@
 #pragma once
-// Writes a calibration session as an EuRoC/ASL folder: what a rig without a calibration records in front of a
+// Writes a calibration session as an EuRoC/ASL folder: the recording of an uncalibrated rig in front of a
 // board.
 //
-//   mav0/cam0, cam1       data.csv, data/<stamp>.jpg or .png; sensor.yaml only where asked for
+//   mav0/cam0, cam1       data.csv, data/<stamp>.jpg or .png; sensor.yaml only if requested
 //   mav0/imu0             data.csv, sensor.yaml with the noise
-//   mav0/state_groundtruth_estimate0   as of a simulated flight (folder_writer.hpp)
-//   truth/calibration     the true calibration as EuRoC files, the time shift and the readout among them
+//   mav0/state_groundtruth_estimate0   as for a simulated flight (folder_writer.hpp)
+//   truth/calibration     the true calibration as EuRoC files, including time shift and readout
 //   truth/board.yaml      the board
-//   truth/session.yaml    what was asked for, the IMU's matrices and the board's place
-// The board hangs in a furnished room. Images have the lens's blur, motion blur, noise and a vignette.
+//   truth/session.yaml    the settings, the IMU's matrices and the board's pose
+// The board hangs in a furnished room. Images have lens blur, motion blur, noise and vignetting.
 
 #include <array>
 #include <cstddef>
@@ -34,8 +34,8 @@ namespace swiftlet {
 struct SessionFolderSettings {
   RigKind rig = RigKind::kEuroc;
   std::uint64_t rig_seed = 1;  ///< of a random rig
-  bool mono = false;           ///< camera 0 alone
-  /// Of rigs that are not random: the image stamps are late by the shift, the shutter rolls.
+  bool mono = false;           ///< camera 0 only
+  /// For rigs that are not random: offset added to the image stamps, and the rolling shutter's readout.
   Duration image_stamp_offset;
   Duration readout;
   SessionSettings session;
@@ -44,22 +44,22 @@ struct SessionFolderSettings {
   SensorSettings sensor;
   ImageFormat format = ImageFormat::kJpeg;
   int jpeg_quality = 92;
-  bool calibrated = false;  ///< the cameras' true sensor.yaml lie in the log
+  bool calibrated = false;  ///< write the cameras' true sensor.yaml into the log
   int threads = 2;
 };
 
-/// Errors as of simulateToFolder. Cost: 5 pairs of 752 x 480 a second on two idle cores.
+/// Errors as in simulateToFolder(). Cost: 5 pairs of 752 x 480 per second on two idle cores.
 Status simulateSessionToFolder(const CalibrationTarget& target, const SessionFolderSettings& settings,
                                const std::string& folder, const SimulationProgress& progress = {},
                                std::string* message = nullptr);
 
-/// One camera's images of a session, without files: for tests.
+/// Images of one camera of a session, without files; for tests.
 class SessionCamera {
  public:
   /// The session and the world must outlive this.
   SessionCamera(const CalibrationSession& session, const TexturedWorld& world, std::size_t camera,
                 const SessionFolderSettings& settings);
-  /// Image k before the sensor: radiance per pixel.
+  /// Image k as radiance per pixel, before the sensor model.
   void render(int k, std::vector<float>& radiance) const;
 
  private:
@@ -70,7 +70,7 @@ class SessionCamera {
   double blur_;
 };
 
-/// A furnished room that the session's cameras and board have for themselves.
+/// A furnished room that contains only the session's cameras and board.
 World sessionRoom(const CalibrationSession& session);
 
 }  // namespace swiftlet

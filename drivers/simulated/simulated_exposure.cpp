@@ -7,7 +7,7 @@ namespace swiftlet {
 namespace {
 
 constexpr Duration kShortest{20'000};
-constexpr double kPeriodShare = 0.8;  // what remains is readout
+constexpr double kPeriodShare = 0.8;  // the rest is readout
 
 }  // namespace
 
@@ -43,7 +43,7 @@ ExposureSetting SimulatedExposure::now() const {
 
 void SimulatedExposure::update(std::uint64_t frame, const ImageView& image, double mean, double turn_rate) {
   if (mode_ == ExposureMode::kGain) {
-    // In a blackout the gain stays: the images that follow are usable at once.
+    // Keep the gain in a blackout, so that the images after it are usable at once.
     if (!image.empty() && mean > 0) gain_.update(mean, period_);
   } else if (mode_ == ExposureMode::kOdometry) {
     std::rotate(coming_.begin(), coming_.begin() + 1, coming_.end());

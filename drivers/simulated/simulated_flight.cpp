@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kLowLight = 0.05;           // share of normal light
 constexpr double kLowLightExposure = 0.010;  // s
-constexpr double kClearanceStep = 0.1;       // s between points that furniture keeps clear of
-constexpr double kSharpTime = 1e-9;          // s: image times are multiples of a period to rounding
+constexpr double kClearanceStep = 0.1;       // s between the path's points that furniture keeps clear of
+constexpr double kSharpTime = 1e-9;          // s: image times are multiples of a period up to rounding
 
 Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
   constexpr double kRadians = std::numbers::pi / 180;
@@ -23,7 +23,7 @@ Rig turnedRig(const Rig& rig, const SimulationSettings& settings) {
   const Eigen::Quaterniond whole = expSo3(kRadians * settings.rig_turn_deg);
   const Eigen::Vector3d centre = rig.T_body_cam[0].translation;
   for (std::size_t c = 0; c < rig.camera_count; ++c) {
-    // Unturned cameras stay as they are to the last bit.
+    // Cameras that are not rotated stay unchanged to the last bit.
     if (settings.rig_turn_deg.isZero(0) && settings.camera_turn_deg[c].isZero(0)) continue;
     const Eigen::Quaterniond own = expSo3(kRadians * settings.camera_turn_deg[c]);
     const SE3& T = rig.T_body_cam[c];
@@ -79,7 +79,7 @@ SimulatedFlight::SimulatedFlight(const SimulationSettings& settings) : settings_
 
   flyAndBuild();
   imu_ = simulateImu(trajectory_, s.imu, s.start, duration_);
-  // Half an exposure of motion must exist after the last row.
+  // The trajectory must cover half an exposure after the last row.
   const double last = duration_ - 0.5 * (longestExposure(s) + s.render.readout);
   image_count_ =
       std::max(0, static_cast<int>(std::floor((last - s.first_image) * s.camera_rate + kSharpTime)) + 1);
@@ -173,7 +173,7 @@ void FlightCameras::render(int k, const std::array<std::uint8_t*, kMaxCameras>& 
   double mean = 0;  // of camera 0
   for (std::size_t c = 0; c < renderers_.size(); ++c) {
     const bool missing = flight_->hasFault(FaultKind::kCameraMissing, c, seconds);
-    // The first exposure needs camera 0's brightness even before the first image that is given.
+    // The first exposure needs camera 0's brightness even if its first images are missing.
     if (missing && (c != 0 || exposure_.started())) continue;
     const CameraModel& camera = renderers_[c].camera();
     const bool dark = flight_->hasFault(FaultKind::kBlackout, c, seconds);

@@ -1,5 +1,5 @@
 #pragma once
-// A flight made from its settings: trajectory, world, rig, IMU readings, and images on demand.
+// A flight generated from its settings: trajectory, world, rig, IMU readings, and images on demand.
 
 #include <cstdint>
 #include <memory>
@@ -11,11 +11,12 @@ namespace swiftlet {
 
 class SimulatedFlight {
  public:
-  /// Builds the trajectory, the world and the IMU readings (no textures yet: milliseconds). Throws
-  /// std::invalid_argument names the setting, InputError the file.
+  /// Builds the trajectory, the world and the IMU readings (milliseconds; no textures yet). Throws
+  /// std::invalid_argument naming the setting, or InputError naming the file.
   explicit SimulatedFlight(const SimulationSettings& settings);
 
-  /// As used: seeds handed down, low light and faults applied, the world fitted to a given motion.
+  /// The settings as used: with seeds for all parts, low light and faults applied, and the world fitted to a
+  /// given motion.
   [[nodiscard]] const SimulationSettings& settings() const { return settings_; }
   [[nodiscard]] const SplineTrajectory& trajectory() const { return trajectory_; }
   [[nodiscard]] const World& world() const { return world_; }
@@ -28,7 +29,7 @@ class SimulatedFlight {
   [[nodiscard]] int imageCount() const { return image_count_; }
   /// Mid-exposure time of image k on the trajectory [s].
   [[nodiscard]] double imageTime(int k) const;
-  /// The stamp that image k is given.
+  /// Stamp of image k in the log.
   [[nodiscard]] Stamp imageStamp(int k) const;
   [[nodiscard]] Stamp stampAt(double seconds) const {
     return settings_.start + Duration::fromSeconds(seconds);
@@ -49,19 +50,19 @@ class SimulatedFlight {
   int image_count_ = 0;
 };
 
-/// Renders a flight's images one after the other: exposure and gain follow from those before.
+/// Renders the images of a flight in order: exposure and gain depend on earlier images.
 class FlightCameras {
  public:
   /// Paints the world (seconds). The flight must outlive this.
   explicit FlightCameras(const SimulatedFlight& flight);
 
   [[nodiscard]] const TexturedWorld& world() const { return *world_; }
-  /// The newest images' exposure and gain.
+  /// Exposure and gain of the newest images.
   [[nodiscard]] const ExposureSetting& takenWith() const { return taken_with_; }
   [[nodiscard]] std::size_t cameraCount() const { return renderers_.size(); }
 
-  /// Image k of every camera, k increasing; `grey[c]` holds width x height bytes. An entry whose camera is
-  /// missing at that time is unchanged, and `present` is false.
+  /// Renders image k of every camera, k increasing; `grey[c]` holds width x height bytes. If a camera is
+  /// missing at that time, its entry is unchanged and its `present` is false.
   void render(int k, const std::array<std::uint8_t*, kMaxCameras>& grey,
               std::array<bool, kMaxCameras>& present);
 
@@ -70,7 +71,7 @@ class FlightCameras {
   std::unique_ptr<TexturedWorld> world_;
   std::vector<CameraRenderer> renderers_;
   SimulatedExposure exposure_;
-  ExposureSetting taken_with_;  ///< the images of the newest frame
+  ExposureSetting taken_with_;  ///< of the newest frame's images
   std::vector<float> radiance_;
 };
 

@@ -1,10 +1,9 @@
 #pragma once
 // A simulated flight as a stream: IMU samples and camera frames in time order, without files.
 //
-// Order: by stamp; an IMU sample comes before a frame of the same stamp, camera 0 before camera 1.
-// Images live in kBuffersPerCamera buffers used in turn: a frame's view stays valid until that
-// many more frames of its camera have come. Nothing is allocated after construction but inside the
-// renderer.
+// Order: by stamp; an IMU sample comes before a frame with the same stamp, camera 0 before camera 1. Images
+// are in kBuffersPerCamera buffers used in turn: a frame's view stays valid until that many further frames of
+// its camera. After construction only the renderer allocates.
 
 #include <array>
 #include <cstdint>
@@ -21,7 +20,7 @@ class SimulatedSource {
   static constexpr std::size_t kBuffersPerCamera = 6;
   enum class Item : std::uint8_t { kImu, kFrame, kEnd };
 
-  /// Paints the world (seconds). Throws as SimulatedFlight does.
+  /// Paints the world (seconds). Throws like SimulatedFlight.
   explicit SimulatedSource(const SimulationSettings& settings);
   SimulatedSource(const SimulatedSource&) = delete;
   SimulatedSource& operator=(const SimulatedSource&) = delete;

@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t kOrder = SplineTrajectory::kOrder;
 using Weights = std::array<double, kOrder>;
 
-// The iteration that makes the spline pass through given poses shrinks the error by at least
-// 1 - 16/120 each time (the collocation matrix's smallest eigenvalue), 1e-9 of it after 150.
+// The iteration that makes the spline pass through given poses multiplies the error by at most 1 - 16/120
+// each time (smallest eigenvalue of the collocation matrix): 1e-9 remains after 150.
 constexpr int kInterpolationSteps = 150;
 
 struct Basis {
@@ -68,7 +68,7 @@ SplineTrajectory SplineTrajectory::interpolate(double start, double spacing,
   assert(samples.size() >= 2);
   const std::size_t count = samples.size();
   std::vector<SE3> controls(count + kOrder - 2);
-  // Beyond the ends the motion goes on as its own reflection through the end pose.
+  // Beyond the ends the motion is reflected through the end pose.
   const auto extend = [&] {
     for (std::size_t k = 1; k <= kCentreOffset; ++k) {
       const SE3& end = controls[kCentreOffset];
@@ -159,7 +159,7 @@ MotionState SplineTrajectory::at(double seconds, SplineJacobian& jacobian) const
   accumulate(basis.value);
   accumulate(basis.first);
 
-  // By the steps between controls; those before step l are carried on by each later turn.
+  // Derivatives by the steps between controls; those before step l are rotated by each later step.
   std::array<Eigen::Matrix3d, kOrder> turn_by_step;
   std::array<Eigen::Matrix3d, kOrder> rate_by_step;
   std::array<Eigen::Vector3d, kOrder> steps;
@@ -177,7 +177,7 @@ MotionState SplineTrajectory::at(double seconds, SplineJacobian& jacobian) const
     rate_by_step[l] = hat(carried) * turn_by_step[l] + speed * Eigen::Matrix3d::Identity();
     omega = carried + speed * steps[l];
   }
-  Eigen::Matrix3d later = Eigen::Matrix3d::Identity();  // of all turns after step l, back
+  Eigen::Matrix3d later = Eigen::Matrix3d::Identity();  // inverse of all rotations after step l
   std::array<Eigen::Matrix3d, kOrder>& turns = jacobian.rotation;
   std::array<Eigen::Matrix3d, kOrder>& rates = jacobian.rate;
   for (std::size_t l = 0; l < kOrder; ++l) {

@@ -1,15 +1,14 @@
 #pragma once
 // A rigid motion whose pose and every derivative are exact: a uniform B-spline of degree 5.
 //
-// What: position p(t) is a quintic B-spline in R^3, attitude R(t) a cumulative quintic B-spline on
-// SO(3). Both are four times continuously differentiable, so velocity, acceleration, angular rate
-// and angular acceleration are those of the motion itself, not differences of poses.
-// Frames: T_world_body; velocities and accelerations in world axes, rates in body axes.
-// Time: seconds since the trajectory's own zero. Outside [startTime(), endTime()] the nearest end
-// counts. Control k has its greatest influence at time start + (k - 2) spacing.
-// Memory: 56 bytes a control; evaluation about 1 us, allocates nothing.
-// Source: de Boor's recurrence for uniform knots; Sommer, Usenko, Schubert, Demmel, Cremers,
-// "Efficient Derivative Computation for Cumulative B-Splines on Lie Groups", CVPR 2020, eq. 22-31.
+// Position p(t) is a quintic B-spline in R^3, attitude R(t) a cumulative quintic B-spline on SO(3). Both are
+// four times continuously differentiable, so velocity, acceleration, angular rate and angular acceleration
+// are those of the motion itself, not differences of poses. Frames: T_world_body; velocities and
+// accelerations in world axes, rates in body axes. Time: seconds since the trajectory's own zero; outside
+// [startTime(), endTime()] the nearest end is used. Control k has its greatest influence at time start + (k -
+// 2) spacing. Memory: 56 bytes per control; evaluation takes about 1 us without allocation.
+// Source: de Boor's recurrence for uniform knots; Sommer, Usenko, Schubert, Demmel, Cremers, "Efficient
+// Derivative Computation for Cumulative B-Splines on Lie Groups", CVPR 2020, eq. 22-31.
 
 #include <Eigen/Core>
 #include <array>
@@ -28,7 +27,7 @@ struct MotionState {
   Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();    ///< rad/s^2, body axes
 };
 
-/// How a state depends on the controls that shape it. A control moves as R <- R Exp(phi), p <- p + d.
+/// Derivatives of a state by the controls that determine it. A control moves as R <- R Exp(phi), p <- p + d.
 struct SplineJacobian {
   static constexpr std::size_t kOrder = 6;
   std::size_t first = 0;                         ///< the oldest of kOrder controls
@@ -40,7 +39,7 @@ struct SplineJacobian {
 
 class SplineTrajectory {
  public:
-  static constexpr std::size_t kOrder = SplineJacobian::kOrder;  ///< controls that shape one segment
+  static constexpr std::size_t kOrder = SplineJacobian::kOrder;  ///< controls per segment
   static constexpr std::size_t kCentreOffset = 2;                ///< controls before the first instant
 
   SplineTrajectory() = default;
@@ -61,13 +60,13 @@ class SplineTrajectory {
 
   [[nodiscard]] SE3 pose(double seconds) const;
   [[nodiscard]] MotionState at(double seconds) const;
-  /// The same, with the derivatives by the controls. Some 2 us.
+  /// The same, with the derivatives by the controls. About 2 us.
   [[nodiscard]] MotionState at(double seconds, SplineJacobian& jacobian) const;
 
  private:
   struct Segment {
     std::size_t first = 0;  ///< index of the oldest control
-    double u = 0;           ///< place in the segment, 0 to 1
+    double u = 0;           ///< position in the segment, 0 to 1
   };
   [[nodiscard]] Segment segmentOf(double seconds) const;
 

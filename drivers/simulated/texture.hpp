@@ -20,7 +20,7 @@ class Texture {
   [[nodiscard]] std::size_t bytes() const { return texels_.size(); }
   [[nodiscard]] int levels() const { return levels_; }
 
-  /// Value at (u, v) metres in the given level, bilinear, held beyond the edges; 0 to 255.
+  /// Value at (u, v) metres in the given level, bilinear, constant beyond the edges; 0 to 255.
   [[nodiscard]] float sample(float u, float v, int level) const {
     const auto l = static_cast<std::size_t>(std::clamp(level, 0, levels_ - 1));
     const Level& info = level_[l];

@@ -9,8 +9,8 @@
 namespace swiftlet {
 
 struct PaintSettings {
-  double texel = 0.0025;     ///< m; coarser where the world would need more than the budget
-  double max_texels = 48e6;  ///< budget of the finest level; memory is 4/3 bytes a texel
+  double texel = 0.0025;     ///< m; coarser if the world would exceed the budget
+  double max_texels = 48e6;  ///< budget of the finest level; memory is 4/3 bytes per texel
   int threads = 2;
 };
 

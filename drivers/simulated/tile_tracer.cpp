@@ -9,7 +9,7 @@ namespace {
 
 constexpr float kPiFloat = std::numbers::pi_v<float>;
 constexpr float kNearest = 1e-3F;  // m
-// A tile wider than this has no useful frustum: every patch is then tested.
+// A wider tile has no useful frustum: every patch is then tested.
 constexpr float kMaxTileTangent = 2.0F;
 
 bool isFlat(Shape shape) { return shape == Shape::kRectangle || shape == Shape::kDisc; }
@@ -27,7 +27,7 @@ void traceFlat(const ViewedPatch& patch, std::int32_t id, Tile& tile) {
   const float vy = patch.v_axis.y();
   const float vz = patch.v_axis.z();
   const float v0 = patch.v_axis.dot(patch.origin);
-  // A rectangle has no circle to stay in: an endless one.
+  // A rectangle is not bounded by a circle: use an infinite radius.
   const float radius = patch.shape == Shape::kDisc ? patch.radius : 0.5F * Tile::kNothing;
   const float centre = patch.shape == Shape::kDisc ? patch.radius : 0.0F;
   const float radius_squared = std::min(radius, 1e15F) * std::min(radius, 1e15F);
@@ -50,7 +50,7 @@ void traceFlat(const ViewedPatch& patch, std::int32_t id, Tile& tile) {
   }
 }
 
-// Cylinders in the plane across their axis, spheres in space: the near root of a quadratic.
+// Cylinders (in the plane across their axis) and spheres: the near root of a quadratic equation.
 void traceRound(const ViewedPatch& patch, std::int32_t id, Tile& tile) {
   const bool cylinder = patch.shape == Shape::kCylinder;
   const Eigen::Vector3f axis = cylinder ? patch.v_axis : Eigen::Vector3f::Zero();
@@ -151,7 +151,7 @@ void patchesInTile(const View& view, const RayTable& rays, int column, int row, 
   float reach_y = 0;
   bool narrow = true;
   for (int y = row; y <= below; ++y) {
-    // The border is enough: a lens maps the inside of a tile inside its border.
+    // The border suffices: a lens maps the inside of a tile to the inside of its border.
     const int stride = y == row || y == below ? 1 : std::max(1, right - column);
     for (int x = column; x <= right; x += stride) {
       const Eigen::Vector3f ray = rays.ray(x, y);
@@ -164,7 +164,7 @@ void patchesInTile(const View& view, const RayTable& rays, int column, int row, 
       reach_y = std::max(reach_y, std::fabs(ray.dot(ey)) / z);
     }
   }
-  // One pixel more for rays beside the centres, and the camera's own turn.
+  // One pixel more for rays beside the centres, and the camera's rotation.
   const float more = 1.5F * rays.pixelAngle() + margin;
   reach_x += more * (1 + reach_x * reach_x);
   reach_y += more * (1 + reach_y * reach_y);

@@ -1,10 +1,10 @@
 #pragma once
 // Finds what each ray of a square tile of pixels sees.
 //
-// The world's patches are taken into the camera frame once per exposure instant; per tile those
-// that can be in it are chosen by its frustum, and each is tested against all rays of the tile in
-// one loop that the compiler vectorizes (single precision; errors below 1e-5 of the distance).
-// Memory: 5 kB a tile on the caller's stack; a view 200 bytes a patch.
+// The world's patches are transformed to the camera frame once per instant of the exposure. For each tile,
+// those that can be in its frustum are selected and tested against all rays of the tile in one loop that the
+// compiler vectorizes (single precision; errors below 1e-5 of the distance). Memory: 5 kB per tile on the
+// caller's stack; 200 bytes per patch of a view.
 
 #include <array>
 #include <cstdint>
@@ -23,7 +23,7 @@ struct ViewedPatch {
   Eigen::Vector3f origin = Eigen::Vector3f::Zero();
   Eigen::Vector3f u_axis = Eigen::Vector3f::Zero();
   Eigen::Vector3f v_axis = Eigen::Vector3f::Zero();  ///< a cylinder's axis; a sphere's pole
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< flat ones; else the third axis
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of flat patches; else the third axis
   float u_length = 0;
   float v_length = 0;
   float radius = 0;
@@ -32,7 +32,7 @@ struct ViewedPatch {
 /// The patches that one camera could see at one instant.
 class View {
  public:
-  /// `slack` [m]: patches whose visible side is turned away by less stay in.
+  /// `slack` [m]: also keeps patches whose visible side faces away by less than this.
   View(const World& world, const SE3& T_world_cam, double slack);
   [[nodiscard]] const std::vector<ViewedPatch>& patches() const { return patches_; }
 
@@ -48,17 +48,17 @@ struct alignas(32) Tile {
   std::array<float, kTilePixels> x;  ///< ray, camera frame
   std::array<float, kTilePixels> y;
   std::array<float, kTilePixels> z;
-  std::array<float, kTilePixels> distance;  ///< along the ray [m]; kNothing where none is hit
+  std::array<float, kTilePixels> distance;  ///< along the ray [m]; kNothing if nothing is hit
   std::array<float, kTilePixels> u;         ///< surface coordinates [m] of flat patches
   std::array<float, kTilePixels> v;
   std::array<std::int32_t, kTilePixels> hit;  ///< index into the view's patches, -1: nothing
 };
 
-/// Rays of the tile at pixel (column, row), each (dx, dy) pixels beside its centre. Beyond the
-/// image's edge the last row and column repeat.
+/// Loads the rays of the tile at pixel (column, row), each (dx, dy) pixels from its centre. Beyond the
+/// image's edge the last row and column are repeated.
 void loadRays(const RayTable& rays, int column, int row, float dx, float dy, Tile& tile);
 
-/// Indices into view.patches() that the tile's rays could hit. `margin` [rad] for a turning camera,
+/// Indices into view.patches() that the tile's rays could hit. `margin` [rad] allows for a rotating camera,
 /// `slack` [m] for a moving one.
 void patchesInTile(const View& view, const RayTable& rays, int column, int row, float margin, float slack,
                    std::vector<std::int32_t>& inside);

@@ -10,7 +10,7 @@ namespace {
 constexpr std::uint64_t kTrackStream = 51;
 constexpr int kGridX = 8;  // cells over which new tracks are spread
 constexpr int kGridY = 6;
-constexpr double kMinKeptShare = 0.5;  // a keyframe is due when fewer tracks than this live on
+constexpr double kMinKeptShare = 0.5;  // a new keyframe if fewer tracks than this survive
 
 std::size_t cellOf(const Eigen::Vector2d& pixel, const CameraModel& camera) {
   const int x = std::clamp(static_cast<int>(pixel.x() * kGridX / camera.width()), 0, kGridX - 1);
@@ -54,10 +54,10 @@ TrackSimulator::Place TrackSimulator::placeAt(double seconds) const {
   return place;
 }
 
-// A rolling shutter sees it in the row that is read while it is there.
+// With a rolling shutter, the pixel at the time when its own row is read.
 bool TrackSimulator::atItsRow(double seconds, std::size_t camera, const Eigen::Vector3d& position,
                               Eigen::Vector2d& pixel) const {
-  constexpr int kRounds = 4;  // each leaves some hundredth of the error before it
+  constexpr int kRounds = 4;  // each reduces the error to some hundredths
   for (int i = 0; i < kRounds; ++i) {
     const double row_time = seconds + rig_->rowTime(camera, pixel.y());
     const SE3 T_cam_world = (trajectory_->pose(row_time) * rig_->T_body_cam[camera]).inverse();
@@ -103,7 +103,7 @@ void TrackSimulator::startTracks(const Place& place) {
   for (const Track& track : tracks_) ++taken[cellOf(track.now, rig_->camera[0])];
   const int cell_limit = settings_.max_tracks / (kGridX * kGridY) + 1;
   int started = 0;
-  // Landmarks were drawn at random: going round them from a random one is as good as drawing.
+  // Landmarks were drawn at random, so iterating from a random one is as good as drawing.
   const auto count = static_cast<std::uint32_t>(landmarks_.size());
   const std::uint32_t offset = random_.below(count);
   for (std::uint32_t k = 0; k < count && started < wanted; ++k) {
@@ -134,7 +134,7 @@ void TrackSimulator::chooseKeyframe(double seconds, TrackedFrame& frame) {
       ++known;
     }
   }
-  // Stamps are whole nanoseconds: half a millisecond of slack keeps the interval's count of frames.
+  // Stamps are whole nanoseconds: half a millisecond of tolerance keeps the number of frames per interval.
   constexpr double kSlack = 5e-4;
   frame.keyframe = seconds - last_keyframe_ > settings_.keyframe_interval - kSlack ||
                    medianOf(since_keyframe) > settings_.keyframe_motion ||

@@ -1,12 +1,11 @@
 #pragma once
-// Feature tracks of a flight without rendering: what a front-end would hand to the smoother.
+// Feature tracks of a flight without rendering, like those that a front-end gives to the smoother.
 //
-// Landmarks are drawn evenly over the world's surfaces. At each frame the tracks that live on are
-// projected with the rig's true calibration, lost ones are replaced by fresh landmarks spread over
-// the image; pixel noise, outliers, drop-outs and limited lifetimes come on top.
-// A landmark seen again after its track ended gets a new id. Frames: pixels distorted, (0,0) the
-// centre of the top-left pixel. Cost: about 0.4 ms a frame with 150 tracks among 400
-// surfaces, most of it for occlusion.
+// Landmarks are drawn uniformly over the world's surfaces. In each frame surviving tracks are projected with
+// the rig's true calibration and lost ones are replaced by new landmarks spread over the image, with pixel
+// noise, outliers, drop-outs and limited lifetimes. A landmark seen again after its track ended gets a new
+// id. Frames: pixels distorted, (0,0) the centre of the top-left pixel. Cost: about 0.4 ms per frame with 150
+// tracks among 400 surfaces, mostly for occlusion.
 
 #include <array>
 #include <cstdint>
@@ -20,27 +19,27 @@
 namespace swiftlet {
 
 struct TrackSettings {
-  int landmarks = 4000;             ///< on the world's surfaces
-  int max_tracks = 150;             ///< features per frame; at most kMaxFeatures
-  double pixel_sigma = 0.5;         ///< px per axis and camera, 1 sigma
-  double mean_lifetime = 4.0;       ///< s; lifetimes are exponential, cut short by leaving the image
-  double dropout = 0.02;            ///< share of sightings missing for one frame, per track
-  double right_share = 0.85;        ///< share of visible right sightings that stereo matching finds
-  double outlier_share = 0.0;       ///< share of sightings displaced at random
-  double outlier_low = 5;           ///< px
-  double outlier_high = 100;        ///< px
-  double min_range = 0.3;           ///< m
-  double max_range = 15;            ///< m
-  double max_slant = 80;            ///< deg between the line of sight and the surface's normal
-  bool occlusion = true;            ///< things hide what is behind them
+  int landmarks = 4000;        ///< on the world's surfaces
+  int max_tracks = 150;        ///< features per frame; at most kMaxFeatures
+  double pixel_sigma = 0.5;    ///< px per axis and camera, 1 sigma
+  double mean_lifetime = 4.0;  ///< s; exponentially distributed, shorter if the landmark leaves the image
+  double dropout = 0.02;       ///< share of sightings missing in one frame, per track
+  double right_share = 0.85;   ///< share of sightings visible in camera 1 that stereo matching finds
+  double outlier_share = 0.0;  ///< share of sightings displaced at random
+  double outlier_low = 5;      ///< px
+  double outlier_high = 100;   ///< px
+  double min_range = 0.3;      ///< m
+  double max_range = 15;       ///< m
+  double max_slant = 80;       ///< deg between the line of sight and the surface's normal
+  bool occlusion = true;       ///< surfaces hide what is behind them
   double keyframe_interval = 0.25;  ///< s at most between keyframes
-  double keyframe_motion = 40;      ///< px of median motion since the last keyframe that make one
-  double border = 4;                ///< px kept free at the image's edge
-  bool mono = false;                ///< camera 0 alone
+  double keyframe_motion = 40;      ///< px, median motion since the last keyframe that triggers a new one
+  double border = 4;                ///< px without features at the image's edge
+  bool mono = false;                ///< camera 0 only
   std::uint64_t seed = 1;
 };
 
-/// Truth beside each feature of a frame.
+/// Truth of each feature of a frame.
 struct TrackTruth {
   Eigen::Vector3d landmark = Eigen::Vector3d::Zero();  ///< world
   std::uint32_t landmark_index = 0;
@@ -54,7 +53,8 @@ class TrackSimulator {
   TrackSimulator(const World& world, const Rig& rig, const SplineTrajectory& trajectory,
                  const TrackSettings& settings);
 
-  /// The tracks at `seconds` of the trajectory, later than the call before. `stamp` is passed on.
+  /// The tracks at `seconds` of the trajectory, which must be later than in the previous call. `stamp` is the
+  /// frame's.
   void step(double seconds, Stamp stamp, TrackedFrame& frame, std::vector<TrackTruth>* truth = nullptr);
 
  private:
@@ -71,7 +71,7 @@ class TrackSimulator {
     Eigen::Vector2d keyframe = Eigen::Vector2d::Zero();  ///< true left pixel in the last keyframe
     Eigen::Vector2d now = Eigen::Vector2d::Zero();
   };
-  /// The cameras at one time of the trajectory.
+  /// Poses of the cameras at one time of the trajectory.
   struct Place {
     double seconds = 0;
     std::array<SE3, kMaxCameras> T_world_cam;

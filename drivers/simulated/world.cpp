@@ -61,14 +61,14 @@ bool hitPatch(const Patch& patch, const Eigen::Vector3d& o, const Eigen::Vector3
   return flat ? hitFlat(patch, o, d, both_sides, hit) : hitRound(patch, o, d, hit);
 }
 
-// True when the line passes outside the bounding sphere.
+// Whether the line passes outside the bounding sphere.
 bool misses(const World::Bound& bound, const Eigen::Vector3d& o, const Eigen::Vector3d& d, double d_squared) {
   const Eigen::Vector3d to = bound.centre - o;
   const double along = to.dot(d);
   return to.squaredNorm() - along * along / d_squared > bound.radius * bound.radius;
 }
 
-// Grid of points over a patch as two triangles a cell.
+// Triangulates a patch as a grid, with two triangles per cell.
 void addGrid(const Patch& patch, int columns, int rows, SurfaceMesh& mesh) {
   const auto base = static_cast<std::uint32_t>(mesh.vertices.size());
   const auto stride = static_cast<std::uint32_t>(columns + 1);
@@ -218,7 +218,7 @@ SurfaceMesh World::mesh(double tolerance) const {
       addGrid(patch, 1, 1, mesh);
       continue;
     }
-    // A chord of angle a leaves the circle by r (1 - cos(a / 2)).
+    // A chord of angle a deviates from the circle by r (1 - cos(a / 2)).
     const double angle = 2 * std::acos(std::max(0.0, 1.0 - tolerance / patch.radius));
     const int steps = std::max(8, static_cast<int>(std::ceil(2 * kPi / angle)));
     if (patch.shape == Shape::kDisc) addFan(patch, steps, mesh);

@@ -1,13 +1,13 @@
 #pragma once
-// A world of simple surfaces: rectangles, discs, upright cylinders and spheres, each with a
-// material to paint, a semantic label and an outward side that alone can be seen.
+// A world of simple surfaces: rectangles, discs, upright cylinders and spheres, each with a material, a
+// semantic label and an outward side, the only one that is visible.
 //
 // Frames: world, z up; metres. A surface point has coordinates (u, v) in metres:
 //  - rectangle: origin + u u_axis + v v_axis, u in [0, u_length], v in [0, v_length]
 //  - disc: the same rectangle of 2 radius by 2 radius, inside the circle touching it
 //  - cylinder: u = radius azimuth (from u_axis, counter-clockwise seen from above), v = height
 //  - sphere: u = radius azimuth, v = radius (latitude + 90 degrees)
-// Ray casting here is the exact, one-ray form (double precision); the renderer has its own.
+// Rays are cast one by one in double precision here; the renderer has its own version.
 
 #include <Eigen/Core>
 #include <array>
@@ -23,7 +23,7 @@ namespace swiftlet {
 
 enum class Shape : std::uint8_t { kRectangle, kDisc, kCylinder, kSphere };
 
-/// Semantic classes; the values are those of labels.csv and of the label images.
+/// Semantic classes; the values appear in labels.csv and in the label images.
 enum class Label : std::uint8_t {
   kUnknown,
   kFloor,
@@ -64,7 +64,7 @@ struct Patch {
   Shape shape = Shape::kRectangle;
   Label label = Label::kUnknown;
   Material material = Material::kPlaster;
-  std::uint8_t zone = 0;         ///< lit by the lamps of the same zone
+  std::uint8_t zone = 0;         ///< lit only by lamps of the same zone
   std::uint32_t paint_seed = 0;  ///< equal seeds, sizes and materials look equal
   Eigen::Vector3d origin =
       Eigen::Vector3d::Zero();  ///< corner; foot of a cylinder's axis; centre of a sphere
@@ -72,7 +72,7 @@ struct Patch {
   Eigen::Vector3d v_axis = Eigen::Vector3d::UnitY();
   double u_length = 1;  ///< m, extent of u
   double v_length = 1;  ///< m, extent of v
-  double radius = 0;    ///< m, all but rectangles
+  double radius = 0;    ///< m, except for rectangles
 
   [[nodiscard]] Eigen::Vector3d pointAt(double u, double v) const;
   [[nodiscard]] Eigen::Vector3d normalAt(double u, double v) const;  ///< unit, outward
@@ -89,7 +89,7 @@ struct SurfacePoint {
 
 struct RayHit {
   std::size_t patch = 0;
-  double distance = 0;  ///< in lengths of the direction
+  double distance = 0;  ///< in multiples of the direction's length
   double u = 0;
   double v = 0;
 };
@@ -120,21 +120,21 @@ class World {
     lamps_.push_back(lamp);
     lamps_.back().zone = zone_;
   }
-  /// The zone of what is added from now on.
+  /// Sets the zone of everything added afterwards.
   void setZone(std::uint8_t zone) { zone_ = zone; }
   void finish();
 
   [[nodiscard]] const std::vector<Patch>& patches() const { return patches_; }
   [[nodiscard]] const std::vector<Lamp>& lamps() const { return lamps_; }
 
-  /// Nearest visible side hit beyond `nearest` and before `farthest` lengths of the direction.
+  /// Nearest hit of a visible side between `nearest` and `farthest`, in multiples of the direction's length.
   [[nodiscard]] std::optional<RayHit> castRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                               double nearest, double farthest) const;
-  /// True if nothing is between the two points; surfaces count from both sides. `slack` [m] is ignored at
-  /// both ends.
+  /// Whether nothing is between the two points; both sides of surfaces count. The last `slack` [m] at either
+  /// end are ignored.
   [[nodiscard]] bool sees(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double slack = 0.01) const;
 
-  /// A point drawn evenly by area.
+  /// A random point, uniform by area.
   [[nodiscard]] SurfacePoint drawPoint(Random& random) const;
 
   /// The surface as triangles; round shapes to within `tolerance` [m].
@@ -168,8 +168,8 @@ std::optional<WorldKind> worldNamed(const std::string& name);
 struct WorldSettings {
   WorldKind kind = WorldKind::kRoom;
   std::uint64_t seed = 1;
-  double clutter = 1.0;  ///< scales the number of things in it
-  /// Size [m]; zero: the kind's own. Only kRoom, kHall and kCluttered can be resized.
+  double clutter = 1.0;  ///< scales the number of objects
+  /// Size [m]; zero: the default of the kind. Only kRoom, kHall and kCluttered can be resized.
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
   Eigen::Vector3d floor_centre = Eigen::Vector3d::Zero();
 };
@@ -177,14 +177,14 @@ struct WorldSettings {
 /// Size of a world as built.
 Eigen::Vector3d worldSize(const WorldSettings& settings);
 
-/// Sizes and places a resizable world so that it holds these points with a margin to its walls.
-/// False when the kind cannot be resized and does not hold them.
+/// Sets size and position of a resizable world so that it contains these points with a margin to its walls.
+/// False if the kind cannot be resized and does not contain them.
 bool fitWorld(WorldSettings& settings, const std::vector<Eigen::Vector3d>& points);
 
-/// The closed path that this world offers.
+/// The closed path offered by this world.
 Tour worldTour(const WorldSettings& settings);
 
-/// Builds it; nothing is put within half a metre of the points in `keep_clear`.
+/// Builds the world; nothing is placed within half a metre of the points in `keep_clear`.
 World buildWorld(const WorldSettings& settings, const std::vector<Eigen::Vector3d>& keep_clear);
 
 }  // namespace swiftlet

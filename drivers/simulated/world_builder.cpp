@@ -16,10 +16,10 @@ using Eigen::Vector3d;
 constexpr double kClearance = 0.5;    // m kept free around the flight path
 constexpr double kWallMargin = 1.5;   // m between a given motion and the walls around it
 constexpr double kFloorMargin = 0.6;  // m below its lowest point
-constexpr double kPosterGap = 0.012;  // m a poster stands off its wall
+constexpr double kPosterGap = 0.012;  // m between a poster and its wall
 constexpr double kTwinSide = 6.0;     // m
 constexpr double kTwinHeight = 3.0;
-constexpr double kTwinOffset = 5.0;  // m of a twin room's centre from the middle
+constexpr double kTwinOffset = 5.0;  // m from a twin room's centre to the middle
 constexpr double kTwinDoor = 1.4;    // m wide
 constexpr double kTwinDoorHeight = 2.3;
 constexpr double kTwinWall = 0.2;  // m thick
@@ -66,7 +66,7 @@ void addWallWithDoor(World& world, const Wall& wall, double left, double right, 
           material, seed + 2);
 }
 
-// Posters and boards of different size, none over another.
+// Posters and boards of different size that do not overlap.
 void hangPosters(World& world, const Wall& wall, double per_metre, Random& random) {
   double at = 0.3;
   const Vector3d out = wall.along.cross(Vector3d::UnitZ());
@@ -97,13 +97,13 @@ void hangLamps(World& world, const Vector3d& centre, const Vector3d& size) {
   }
 }
 
-// Decides where things may stand: away from the flight path and from each other.
+// Decides where objects may stand: away from the flight path and from each other.
 class Ground {
  public:
   Ground(const Vector3d& centre, const Vector3d& size, std::vector<Vector3d> clear)
       : centre_(centre), size_(size), clear_(std::move(clear)) {}
 
-  // A free place for a thing of this footprint radius and height, or false after some tries.
+  // A free place for an object with this footprint radius and height, or false after some attempts.
   bool find(Random& random, double radius, double height, bool at_wall, Place& place) {
     constexpr int kTries = 40;
     for (int attempt = 0; attempt < kTries; ++attempt) {
@@ -165,7 +165,7 @@ void putThings(World& world, Ground& ground, const Vector3d& size, const Furnish
   for (int i = 0; i < things.shelves; ++i) {
     const Vector3d extent(random.uniform(0.9, 1.6), 0.35, std::min(random.uniform(1.4, 2.3), size.z() - 0.4));
     if (ground.find(random, 0.5 * extent.x(), extent.z(), true, place)) {
-      // The place keeps a circle free of the wall; the shelf itself goes back against it.
+      // The place keeps a circle free of the wall; the shelf is moved back against it.
       const Vector3d back(std::sin(place.yaw), -std::cos(place.yaw), 0);
       place.foot += (0.5 * extent.x() - 0.5 * extent.y()) * back;
       addShelf(world, place, extent, random.next());
@@ -226,7 +226,7 @@ void putThings(World& world, Ground& ground, const Vector3d& size, const Furnish
   }
 }
 
-// Mats and printed boards that lie on the floor, none over another.
+// Mats and printed boards on the floor that do not overlap.
 void layMats(World& world, const Vector3d& centre, const Vector3d& size, int count, Random& random) {
   std::vector<Eigen::Vector2d> laid;
   for (int i = 0; i < count; ++i) {
@@ -308,7 +308,7 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
   const Vector3d middle = settings.floor_centre;
   const std::array<Vector3d, 2> centres{middle + Vector3d(-kTwinOffset, 0, 0),
                                         middle + Vector3d(kTwinOffset, 0, 0)};
-  // What must be free in either room must be free in both.
+  // Points that must be free in either room must be free in both.
   std::vector<Vector3d> local;
   for (const Vector3d& centre : centres) {
     for (const Vector3d& p : clear) local.push_back(p - centre);
@@ -316,8 +316,9 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
   const double left = 0.5 * (kTwinSide - kTwinDoor);
   const double right = left + kTwinDoor;
   for (const Vector3d& centre : centres) {
-    Random random(settings.seed, 42);                                        // the same for both
-    world.setZone(static_cast<std::uint8_t>(&centre - centres.data() + 1));  // else their light would differ
+    Random random(settings.seed, 42);                                        // the same for both rooms
+    world.setZone(static_cast<std::uint8_t>(&centre - centres.data() + 1));  // separate zones: otherwise
+                                                                             // their light would differ
     addFloorAndCeiling(world, centre, size, Material::kParquet, Material::kPlaster, random.next());
     const auto sides = roomWalls(centre, size);
     constexpr std::array<Material, 4> kLooks{Material::kPlaster, Material::kBrick, Material::kPlaster,
@@ -388,7 +389,7 @@ void buildCorridor(World& world, const WorldSettings& settings) {
     addWall(world, wall, random.uniform() < 0.5 ? Material::kPlaster : Material::kBrick, random.next());
     hangPosters(world, wall, 0.7, random);
   }
-  // The block in the middle, seen from outside: the walls of a room turned about.
+  // The block in the middle, seen from outside: the walls of a room, reversed.
   const Vector3d core(kRingX - 2 * kPassage, kRingY - 2 * kPassage, kRingHeight);
   for (const Wall& inside : roomWalls(centre, core)) {
     const Wall wall{inside.corner + inside.length * inside.along, -inside.along, inside.length,
