@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kCells = 10;  ///< of a tag's edge
+constexpr int kCells = 10;  ///< per side of a tag
 constexpr int kBorder = 2;  ///< cells
 constexpr int kPackagedBorder = 1;
 
@@ -28,7 +28,7 @@ Cells tagCells(const apriltag_family_t& family, int tag) {
   return black;
 }
 
-/// The runs of black cells in a row, those of equal rows that follow each other joined.
+/// Adds the runs of black cells of each row; equal runs of consecutive rows are joined.
 void addTag(const Cells& black, const Eigen::Vector2d& lower_left, double size,
             std::vector<BoardRectangle>& areas) {
   const double cell = size / kCells;
@@ -96,7 +96,7 @@ BoardRectangle printedArea(const CalibrationTarget& target) {
 }
 
 double whiteMargin(const CalibrationTarget& target) {
-  // A tag's white frame is as wide as the gap; a chessboard's search wants a good part of a square.
+  // A tag's white frame is as wide as the gap; detecting a chessboard needs about half a square.
   return target.hasTags() ? target.size * target.gap : 0.5 * std::min(target.size, target.square_height);
 }
 

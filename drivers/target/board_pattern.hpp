@@ -1,12 +1,11 @@
 #pragma once
-// What is printed on a calibration board: its black areas as rectangles in board axes
-// (calibration_target.hpp).
+// The print of a calibration board: its black areas as rectangles in board axes (calibration_target.hpp).
 //
-// AprilGrid, Kalibr's layout: a tag is 10 cells wide, 2 of them black border on each side, its code upright
-// for a viewer whose y is up; black squares as wide as the gap touch the corners of every tag, the outermost
-// too, so that each corner is where two black and two white areas meet. Checkerboard: the square left of and
-// below corner 0 is black. The codes are libapriltag's tag36h11.
-// Source: ethz-asl/kalibr, kalibr_create_target_pdf (layout alone).
+// AprilGrid, Kalibr's layout: a tag is 10 cells wide, with 2 cells of black border on each side; its code is
+// upright for a viewer with y up. Black squares as wide as the gap touch the corners of every tag, also of
+// the outermost ones, so that two black and two white areas meet at each corner. Checkerboard: the square
+// left of and below corner 0 is black. The codes are libapriltag's tag36h11.
+// Source: ethz-asl/kalibr, kalibr_create_target_pdf (layout only).
 
 #include <Eigen/Core>
 #include <vector>
@@ -20,16 +19,16 @@ struct BoardRectangle {
   Eigen::Vector2d high = Eigen::Vector2d::Zero();
 };
 
-/// Largest number of tags on a board: the family's.
+/// Largest number of tags on a board: the size of the family.
 inline constexpr int kTagCount = 587;
 
-/// Disjoint; they may touch. At most some 40 a tag.
+/// Disjoint rectangles, which may touch; at most about 40 per tag.
 [[nodiscard]] std::vector<BoardRectangle> blackAreas(const CalibrationTarget& target);
 
 /// The rectangle around all black areas.
 [[nodiscard]] BoardRectangle printedArea(const CalibrationTarget& target);
 
-/// White that a board needs around `printedArea` to be found [m].
+/// Width of the white margin that a board needs around printedArea() to be found [m].
 [[nodiscard]] double whiteMargin(const CalibrationTarget& target);
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// A calibration board: where its corners are.
+// A calibration board: the positions of its corners.
 //
 // Frames: board axes x right, y up, z = 0 on the print and out of it towards the viewer; metres. The origin
 // is the lower left corner of the tag 0 (AprilGrid) or the lower left inner corner (checkerboard). AprilGrid
@@ -16,11 +16,11 @@ enum class TargetKind : std::uint8_t { kAprilGrid, kCheckerboard };
 
 struct CalibrationTarget {
   TargetKind kind = TargetKind::kAprilGrid;
-  int columns = 6;  ///< tags, or inner corners, side by side
+  int columns = 6;  ///< tags or inner corners per row
   int rows = 6;
-  double size = 0.088;          ///< m: edge of a tag's black border; a square's width
-  double square_height = 0.06;  ///< m: checkerboard alone
-  double gap = 0.3;             ///< between tags, in tag edges: AprilGrid alone
+  double size = 0.088;          ///< m: edge of a tag's black border, or width of a square
+  double square_height = 0.06;  ///< m: checkerboard only
+  double gap = 0.3;             ///< between tags, in tag edges: AprilGrid only
 
   [[nodiscard]] bool hasTags() const { return kind == TargetKind::kAprilGrid; }
   [[nodiscard]] int cornerCount() const { return columns * rows * (hasTags() ? 4 : 1); }

@@ -11,9 +11,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kFewest = 3;           ///< tags or inner corners side by side, as Kalibr asks
-constexpr int kMostCorners = 100;    ///< of a checkerboard, side by side: more is a mistake
-constexpr double kShortest = 0.001;  ///< m; an edge outside of these is in another unit
+constexpr int kFewest = 3;           ///< tags or inner corners per side, as in Kalibr
+constexpr int kMostCorners = 100;    ///< per side of a checkerboard: more is a mistake
+constexpr double kShortest = 0.001;  ///< m; lengths outside of this range are in another unit
 constexpr double kLongest = 2;       ///< m
 constexpr double kWidestGap = 1;     ///< tag edges
 

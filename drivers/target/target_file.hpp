@@ -16,7 +16,7 @@ namespace swiftlet {
 [[nodiscard]] CalibrationTarget readTarget(const std::string& file);
 /// `name` names the file in messages.
 [[nodiscard]] CalibrationTarget parseTarget(const std::string& name, std::string_view text);
-/// The file that Kalibr and readTarget read; lengths to a micrometre.
+/// Text of a target file for Kalibr and readTarget(); lengths rounded to a micrometre.
 [[nodiscard]] std::string targetYaml(const CalibrationTarget& target);
 
 /// "AprilGrid of 6 x 6 tags, 88.0 mm each, gap 26.4 mm".
