@@ -11,7 +11,7 @@ void AccelAtGyro::add(Queue& queue, const Sample& sample) {
   queue.newest = sample.stamp;
   if (queue.count == kRoom) {
     queue.pop();
-    // Of a gyro that has stopped, the accelerometer's older samples are of no use: nothing is lost.
+    // Dropped accelerometer samples are not counted: once the gyro has stopped, they are not needed.
     if (&queue == &gyro_) ++counters_.overrun;
   }
   queue.samples[(queue.first + queue.count) % kRoom] = sample;
@@ -21,7 +21,7 @@ void AccelAtGyro::add(Queue& queue, const Sample& sample) {
 bool AccelAtGyro::next(Stamp now, ImuReading& reading) {
   for (; gyro_.count > 0; gyro_.pop()) {
     const Sample& gyro = gyro_.at(0);
-    // The last one that is not newer stays as the left neighbour.
+    // The newest accelerometer sample that is not after the gyro sample stays as the left neighbour.
     while (accel_.count >= 2 && accel_.at(1).stamp <= gyro.stamp) accel_.pop();
     const bool has_left = accel_.count > 0 && accel_.at(0).stamp <= gyro.stamp;
     const bool exact = has_left && accel_.at(0).stamp == gyro.stamp;

@@ -1,12 +1,12 @@
 #pragma once
-// A gyroscope and an accelerometer that send apart, as one inertial sensor: at each gyro sample the
-// accelerometer's value, linear between its two neighbours. Both stamp by one clock.
+// Joins a gyroscope and an accelerometer that send separately into one inertial sensor: the accelerometer is
+// interpolated linearly to each gyro stamp. Both must stamp with the same clock.
 //
-// A gyro sample waits until an accelerometer sample that is not older has come, and no longer than
-// kPatience after its own arrival; it is left out then, and where the neighbours are more than kLongestGap
-// apart or older than it all. Samples that are not newer than the one before of their kind are left out too.
-// All of these are counted. What linear interpolation costs: the accelerometer's own bandwidth, which its
-// rate bounds anyway.
+// A gyro sample waits for an accelerometer sample at or after its stamp, but at most kPatience after its own
+// arrival. It is dropped if none comes by then, if it is older than every accelerometer sample, or if its two
+// neighbours are more than kLongestGap apart. A sample that is not newer than the previous one of its kind is
+// dropped too. All drops are counted. Linear interpolation costs only accelerometer bandwidth, which its rate
+// limits anyway.
 //
 // Threads: one. Memory: fixed, 0.6 s of the fastest sensors. Cost: O(1) a sample.
 
@@ -22,7 +22,7 @@ namespace swiftlet {
 
 class AccelAtGyro {
  public:
-  /// Three periods of the slowest accelerometer that cameras carry, 63 Hz.
+  /// Three periods of the slowest accelerometer found in cameras, 63 Hz.
   static constexpr Duration kPatience = Duration::fromMilliseconds(50);
   static constexpr Duration kLongestGap = Duration::fromMilliseconds(50);
 
@@ -33,14 +33,15 @@ class AccelAtGyro {
   };
 
   struct Counters {
-    std::uint64_t stale = 0;     ///< not newer than the one before of its kind
-    std::uint64_t unpaired = 0;  ///< gyro samples without accelerometer samples around them
-    std::uint64_t overrun = 0;   ///< more than there is room for
+    std::uint64_t stale = 0;     ///< not newer than the previous sample of its kind
+    std::uint64_t unpaired = 0;  ///< gyro samples without usable accelerometer neighbours
+    std::uint64_t overrun = 0;   ///< gyro samples lost because the queue was full
   };
 
   void addGyro(const Sample& sample) { add(gyro_, sample); }
   void addAccel(const Sample& sample) { add(accel_, sample); }
-  /// The next sample that is whole by `now`; false: none. Its stamp is the gyro's, in `host`.
+  /// Takes the next gyro sample that can be completed at time `now`; false: none. `reading.host` is the
+  /// gyro's stamp.
   bool next(Stamp now, ImuReading& reading);
   [[nodiscard]] const Counters& counters() const { return counters_; }
 

@@ -9,23 +9,24 @@ namespace swiftlet {
 namespace {
 
 constexpr double kPpm = 1e-6;
-// A step ahead shows as a delay below the envelope. Up to this it is taken at once (being wrong costs a new
-// start from a line that is right), beyond it only when it lasts: one garbled stamp must not shift all.
+// A clock step ahead shows as a delay below the envelope. Up to this size it is accepted at once: a wrong
+// decision only restarts the envelope from a valid point. A larger one must persist, so that one garbled
+// stamp does not shift the clock.
 constexpr double kAtOnce = 5e6;         // ns
-constexpr double kStepTolerance = 2e5;  // ns: smaller steps are within what is asked of the map
-constexpr double kTooOld = 1e9;         // ns: no estimator has a use for it, and steps back look like it
-// A new clock: this many stamps, for this long, advancing as the arrivals do. A queue that drains after a
-// stall does not: its arrivals stand nearly still.
+constexpr double kStepTolerance = 2e5;  // ns: smaller steps are within the required accuracy
+constexpr double kTooOld = 1e9;         // ns: too late for the estimator; steps back look like this too
+// Conditions for a new clock: this many stamps over this span that advance as fast as their arrivals. A queue
+// that is emptied after a stall does not meet them: its arrivals hardly advance.
 constexpr int kConfirm = 5;
 constexpr std::int64_t kConfirmSpan = 50'000'000;
 constexpr std::int64_t kConfirmSlack = 20'000'000;
-// A step back is seen when no delay comes near the smallest any more (LowerEnvelope::raised). The tolerance
-// is what a crystal that warms up by 0.8 ppm/s bends off the line; 2 s, because links are busy for shorter
-// times.
+// A step back is detected when no delay comes near the smallest any more (LowerEnvelope::raised). The
+// tolerance is the deviation from a line of a crystal that warms up at 0.8 ppm/s. Links can be busy for a
+// while, but for less than these 2 s.
 constexpr double kRaisedTolerance = 1e5;  // ns
 constexpr std::size_t kRaisedBins = 8;
 constexpr double kSurprise = 16;
-// Locked: two seconds of bins, and the fit's own estimate.
+// Locked: points over at least two seconds, and a small enough uncertainty of the fit.
 constexpr std::size_t kLockBins = 8;
 constexpr std::int64_t kLockSpan = 4'000'000'000;
 constexpr double kLockUncertainty = 2e5;  // ns

@@ -1,23 +1,25 @@
 #pragma once
-// From a sensor's own clock to the host's CLOCK_MONOTONIC, where only the sensor speaks.
+// Maps a sensor's clock to the host's CLOCK_MONOTONIC from one-way messages.
 //
-// In: pairs (device stamp, arrival). Out, at once: the host's stamp of the device stamp. With x the device
-// stamp, arrival - x = offset(x) + constant delay + jitter, jitter >= 0: the offset is the lower envelope
-// (lower_envelope.hpp). What no one-way link can tell stays in: the constant delay; set it where it is known.
+// Input: pairs (device stamp x, arrival a). Output, without waiting: the host stamp of x. The model is a - x
+// = offset(x) + constant delay + jitter with jitter >= 0, so offset + constant delay is the lower envelope of
+// a - x (lower_envelope.hpp). The constant delay is not observable from one-way messages: set it if it is
+// known.
 //
-// - Stamps that are handed out rise strictly (rising_stamps.hpp) and are never after the arrival, but for
-//   what rising asks of them.
-// - The device's clock steps: a stamp that repeats or goes back, that lies before what the delay allows, or a
-//   second older than its arrival, is refused; five such that agree with each other for 50 ms are a new
-//   clock. A step back by less than that lasts no longer than it, and is followed on: what comes after it
-//   lies nearer to the stamps that went back than to the line. A smaller step ahead shows as a delay below
-//   the smallest, one back by less than a sample as 2 s or more without a delay near it. The offset then
-//   starts anew, the skew is kept.
-// - Lost samples and outages cost nothing; through an outage the line is carried on at its slope.
-// - A constant delay that grows for more than 2 s looks like a step back: nothing else can be told.
+// - Returned stamps rise strictly (rising_stamps.hpp). They are not later than the arrival, unless that is
+//   needed to keep them rising.
+// - Steps of the device's clock. A stamp is refused if it repeats or goes back, if it is more than 5 ms too
+//   early for the smallest delay, or if it is one second older than its arrival. Five refused stamps over 50
+//   ms that agree with each other set the new clock. After a step back of less than 50 ms the stamps soon
+//   pass the old ones; they still count as refused while their delay is nearer to that of the refused stamps
+//   than to the line. A step ahead of up to 5 ms shows as a delay below the smallest; a step back by less
+//   than a sample shows as at least 2 s without a delay near the smallest. After either the offset restarts
+//   and the skew is kept.
+// - Lost samples and outages do no harm; during an outage the line is extrapolated with its slope.
+// - A constant delay that grows for more than 2 s is taken for a step back: the two cannot be distinguished.
 //
-// Errors: kInvalidInput, no stamp (the reasons above; counted). Cost: 0.13 us a sample on average, about 2 us
-// four times a second. Memory: 3 KiB, nothing allocated.
+// Errors: kInvalidInput, no stamp (reasons above; counted). Cost: 0.13 us per sample on average, about 2 us
+// four times a second. Memory: 3 KiB, no allocation.
 
 #include <cstdint>
 #include <optional>
@@ -31,25 +33,25 @@
 namespace swiftlet {
 
 struct ClockMapSettings {
-  Duration constant_delay;    ///< sensing to arrival when nothing delays it; subtracted
-  double max_skew_ppm = 150;  ///< crystals are within 100; the margin is the host's own
+  Duration constant_delay;    ///< smallest delay from sensing to arrival; subtracted
+  double max_skew_ppm = 150;  ///< crystals are within 100; the rest is margin for the host's clock
 };
 
 class ClockMap {
  public:
   explicit ClockMap(const ClockMapSettings& settings = {});
 
-  /// Learns from one sample and maps it. `host` is written when the status is ok.
+  /// Learns from one sample and maps it. `host` is written only if the status is ok.
   Status add(Stamp device, Stamp arrival, Stamp& host);
-  /// Maps without learning and without rising: stamps of other things on the same clock. Empty before the
-  /// first sample and for stamps that cannot be.
+  /// Maps other stamps of the same clock. Does not learn and does not force stamps to rise. Empty before the
+  /// first sample and for stamps out of range.
   [[nodiscard]] std::optional<Stamp> toHost(Stamp device) const;
 
   [[nodiscard]] LockState lock() const;
   [[nodiscard]] TimesyncStatus status() const;
 
  private:
-  /// Stamps that do not fit: a new clock if they continue and agree with each other.
+  /// Refused stamps. They become the new clock if they continue and agree with each other.
   struct Candidate {
     int count = 0;
     Stamp first_device, first_arrival, newest_device;
@@ -68,8 +70,8 @@ class ClockMap {
   RisingStamps rising_;
   Candidate candidate_;
   Stamp newest_;
-  Duration step_;                ///< from the sample before
-  std::uint64_t seen_bins_ = 0;  ///< of the envelope's, that watchForStepBack has looked at
+  Duration step_;                ///< from the previous sample, device clock
+  std::uint64_t seen_bins_ = 0;  ///< envelope bins that watchForStepBack() has checked
   std::uint64_t samples_ = 0;
   std::uint64_t resets_ = 0;
   std::uint64_t refused_ = 0;

@@ -1,9 +1,9 @@
 #pragma once
-// Quantiles of non-negative durations over the last one to two spans of the clock, in fixed memory.
+// Quantiles of non-negative durations over the last 32 to 64 s, in fixed memory.
 //
-// Quarter octaves from 1 us to 67 s: a quantile is right to 19 % (the upper edge of its bin is given). Two
-// generations: the older one is forgotten when the newer has lasted `kGeneration`. add(): O(1); quantile():
-// O(bins). Memory: 1 KiB.
+// Bins of a quarter octave from 1 us to 67 s. A quantile is the upper edge of its bin, so its error is below
+// 19 %. Two generations: the older one is dropped when the newer one is `kGeneration` long. Cost: add() O(1),
+// quantile() O(bins). Memory: 1 KiB.
 
 #include <array>
 #include <cstddef>
@@ -21,8 +21,8 @@ class DelayHistogram {
   void clear() { *this = DelayHistogram(); }
 
  private:
-  static constexpr Duration kGeneration = {32'000'000'000};  // as the clock maps' window
-  static constexpr std::size_t kBins = 106;                  // 4 an octave, 26 octaves and both ends
+  static constexpr Duration kGeneration = {32'000'000'000};  // same as the window of the clock maps
+  static constexpr std::size_t kBins = 106;                  // 4 per octave over 26 octaves, and both ends
 
   std::array<std::array<std::uint32_t, kBins>, 2> counts_{};
   Stamp begun_;

@@ -8,12 +8,12 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kOnGrid = 0.1;  // periods: above a trigger's jitter; see TriggerMatcher on pauses
+constexpr double kOnGrid = 0.1;  // periods: above a trigger's jitter; TriggerMatcher's bounds assume it
 constexpr std::int64_t kLongestGap =
-    16;                             // periods over which the tracked period holds to a fraction of kOnGrid
-constexpr std::int64_t kAhead = 4;  // periods: a frame is there before its edge was read
+    16;  // periods; over this long the tracked period stays accurate to a fraction of kOnGrid
+constexpr std::int64_t kAhead = 4;  // periods: a frame can arrive before its edge is read
 constexpr int kOtherGrid = 4;
-// The grid follows a jittering trigger slowly (alpha-beta filter), the period slower.
+// Alpha-beta filter: the grid follows a jittering trigger slowly, the period even more slowly.
 constexpr double kPhaseGain = 0.25;
 constexpr double kPeriodGain = 0.03;
 constexpr double kPeriodBound = 0.05;  // of nominal
@@ -76,7 +76,7 @@ void EdgeTrain::add(Stamp edge, std::optional<std::uint32_t> sequence) {
     return;
   }
   const auto steps = static_cast<std::int64_t>(place);
-  // Events that the kernel numbered one after the other: nothing was lost between them.
+  // Consecutive kernel numbers: no event was lost between them.
   const bool none_lost = before && sequence && *sequence - *before == 1;
   if (!none_lost) missed_ += static_cast<std::uint64_t>(steps - 1);
   newest_ += steps;
@@ -98,7 +98,7 @@ std::optional<EdgeTrain::Edge> EdgeTrain::at(std::int64_t index) const {
   const auto from = [&](Stamp stamp, std::int64_t steps) {
     return Edge{{stamp.ns + std::llround(static_cast<double>(steps) * period_)}, false};
   };
-  // An edge off the grid may be the first of another grid.
+  // Do not extrapolate while edges are off the grid: a new grid may have begun.
   if (index > newest_ && others_ > 0) return std::nullopt;
   if (index > newest_) return from(grid_, index - newest_);
   for (std::int64_t n = 1; n <= kLongestGap; ++n) {

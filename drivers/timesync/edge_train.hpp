@@ -1,15 +1,15 @@
 #pragma once
-// The edges of a periodic trigger, numbered like the pulses that made them, despite missed edges and
-// additional glitches.
+// Numbers the edges of a periodic trigger by their pulses, despite missed edges and glitches.
 //
-// The number follows from the time: an edge is on the grid of the tracked period, or it is a glitch. Cameras
-// with one trigger share one train, so equal numbers are equal exposures.
+// The number follows from the time: an edge on the grid of the tracked period is a pulse, any other is a
+// glitch. Cameras with the same trigger share one train, so equal numbers mean the same exposure.
 //
-// - On the grid: within 0.1 periods. Of two edges at one position the one closer to the grid counts.
-// - Gaps of up to 16 periods are bridged. After a longer one, or when four edges in a row agree on another
+// - On the grid means within 0.1 periods. If two edges fall on the same position, the one closer to the grid
+//   is used.
+// - Gaps of up to 16 periods are bridged. After a longer gap, or when four edges in a row agree on another
 //   grid, numbering restarts and `epoch` increases.
 //
-// Cost: O(1). Memory: 256 edges, 4 KiB. Any stamps; nothing overflows.
+// Cost: O(1). Memory: 256 edges, 4 KiB. Accepts any stamps without overflow.
 
 #include <array>
 #include <cstddef>
@@ -22,16 +22,16 @@ namespace swiftlet {
 
 class EdgeTrain {
  public:
-  /// `period`: nominal, right to 2 %; positive.
+  /// `period`: nominal, within 2 % of the true one; positive.
   explicit EdgeTrain(Duration period);
 
-  /// One edge in reading order. `sequence`: of the kernel's events on this line; it shows whether absent
-  /// pulses were missed or did not exist.
+  /// Adds one edge, in reading order. `sequence`: the kernel's event number on this line. It shows whether
+  /// pulses without an edge were missed or did not exist.
   void add(Stamp edge, std::optional<std::uint32_t> sequence = std::nullopt);
 
   struct Edge {
     Stamp stamp;
-    bool measured = false;  ///< false: not read (or not yet); from its neighbours and the period
+    bool measured = false;  ///< false: not read (yet); computed from its neighbours and the period
   };
   /// The edge of pulse `index` of this epoch; empty if no edge is near.
   [[nodiscard]] std::optional<Edge> at(std::int64_t index) const;
@@ -58,7 +58,7 @@ class EdgeTrain {
   double period_;
   std::array<Slot, kKept> slots_{};
   std::int64_t newest_ = -1;  ///< index
-  Stamp grid_;                ///< where the grid has pulse newest_
+  Stamp grid_;                ///< time of pulse newest_ on the grid
   bool any_ = false;
   std::optional<std::uint32_t> sequence_;
   int others_ = 0;  ///< edges in a row that agree on another grid

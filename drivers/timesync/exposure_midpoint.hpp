@@ -1,6 +1,6 @@
 #pragma once
-// The middle of the exposure, which is an image's stamp, from what a camera's driver or a trigger line gives.
-// Rolling shutter: of the middle row.
+// Computes the middle of the exposure, which is the stamp of an image, from the event that a camera driver or
+// a trigger line stamps. For a rolling shutter it is the middle of the middle row's exposure.
 
 #include <cstdint>
 
@@ -12,7 +12,7 @@ enum class FrameEvent : std::uint8_t {
   kStartOfExposure,  ///< of the first row (V4L2 SOE)
   kEndOfExposure,    ///< of the first row
   kEndOfFrame,       ///< the last row was read out (V4L2 EOF)
-  kTriggerEdge,      ///< the edge that started it
+  kTriggerEdge,      ///< the edge that started the exposure
 };
 
 struct ExposureTiming {
@@ -22,8 +22,8 @@ struct ExposureTiming {
   bool rolling = false;
 };
 
-/// Global: start + e/2; end of exposure - e/2; end of frame - readout - e/2. Rolling: half the readout later,
-/// since the middle row is. An edge is a start after its latency.
+/// Global shutter: start + e/2; end of exposure - e/2; end of frame - readout - e/2. Rolling shutter: half
+/// the readout later, at the middle row. A trigger edge plus its latency is a start of exposure.
 constexpr Stamp exposureMidpoint(Stamp stamp, FrameEvent event, const ExposureTiming& timing) {
   const std::int64_t half = timing.exposure.ns / 2;
   const std::int64_t half_readout = timing.readout.ns / 2;
@@ -35,7 +35,7 @@ constexpr Stamp exposureMidpoint(Stamp stamp, FrameEvent event, const ExposureTi
   return {stamp.ns + latency + half + (timing.rolling ? half_readout : 0)};
 }
 
-/// What to expect from the edge to the driver's stamp (TriggerMatcher).
+/// Expected time from the trigger edge to the driver's stamp (for TriggerMatcher).
 constexpr Duration expectedLag(FrameEvent driver_stamps, const ExposureTiming& timing) {
   switch (driver_stamps) {
     case FrameEvent::kStartOfExposure:

@@ -8,24 +8,24 @@ namespace swiftlet {
 namespace {
 
 constexpr std::int64_t kWindow = static_cast<std::int64_t>(LowerEnvelope::kBins) *
-                                 LowerEnvelope::kBinWidth.ns;  // 32 s: shorter than crystals take to warm up
-// After an outage the old points hold the line until the new ones are enough to stand alone: 2 s of them.
+                                 LowerEnvelope::kBinWidth.ns;  // 32 s: shorter than a crystal's warm-up
+// After an outage the old points support the line until the new ones suffice alone: 2 s of them.
 constexpr std::size_t kAloneFrom = 8;
-// What a slope is taken from. One that is known from a longer span is not replaced by one from a shorter.
+// Shortest span for a slope. A slope from a longer span is not replaced by one from a shorter span.
 constexpr std::int64_t kFirstSpan = 2'000'000'000;
 constexpr std::int64_t kLaterSpan = 8'000'000'000;
-// The lowest of n points of even density lie a few times mean / n above the true line; the factor is the
+// The lowest of n evenly distributed points lie a few times mean / n above the true line. The factor is the
 // 99 % point of the simulated clocks in tests/drivers/timesync.
 constexpr double kFitFactor = 4;
-constexpr double kWander = 2e-6;  // a crystal's rate in flight, between windows
-// Farther than this [ns] from the newest point a line says nothing; keeps the sum within int64.
+constexpr double kWander = 2e-6;  // change of a crystal's rate in flight between windows
+// The line is not extrapolated beyond this value [ns], which keeps the sum within int64.
 constexpr double kFarthest = 1e18;
 
 }  // namespace
 
 Duration LowerEnvelope::span() const { return {count_ == 0 ? 0 : point(count_ - 1).time - point(0).time}; }
 
-// In double: two heights of hostile stamps are farther apart than int64 goes.
+// In double: the difference of two heights of arbitrary stamps can exceed int64.
 double LowerEnvelope::rise(const Point& from, const Point& to) {
   return static_cast<double>(to.value) - static_cast<double>(from.value);
 }
@@ -59,7 +59,7 @@ bool LowerEnvelope::raised(std::size_t fewest, double tolerance, double surprise
   tolerance += kFitFactor * mean_excess_ / static_cast<double>(count_);
   double lowest = std::numeric_limits<double>::infinity();
   double most = 0;
-  // The newest bin is still filling, and one at least must have been right.
+  // The newest bin is not complete; at least one older bin must have been on the line.
   for (std::size_t n = 1; n + 2 <= count_; ++n) {
     const Point& p = point(count_ - 1 - n);
     lowest = std::min(lowest, height(p));

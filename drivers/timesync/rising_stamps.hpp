@@ -1,10 +1,10 @@
 #pragma once
-// Makes the stamps that a map hands out strictly rising without holding an error.
+// Makes the stamps of a clock map strictly rising without a lasting error.
 //
-// A map that has just learnt of a smaller delay says an earlier time than it would have. Where that would not
-// rise, the stamp moves on by a quarter of the device's own step instead: the map catches up with the other
-// three quarters of each step. Where catching up would take a stamp more than kMostAhead from the truth,
-// there is no stamp until the map has passed the last one. O(1).
+// When the map learns a smaller delay, its next stamp can be earlier than the last one. Then the stamp
+// advances by a quarter of the device's own step instead, so three quarters of each step are caught up. If a
+// stamp would be more than kMostAhead later than the map, there is no stamp until the map has passed the last
+// one. O(1).
 
 #include <algorithm>
 
@@ -14,7 +14,7 @@ namespace swiftlet {
 
 class RisingStamps {
  public:
-  /// `step`: from the sample before on the device's clock, positive. False: no stamp for this sample.
+  /// `step`: time since the previous sample on the device's clock, positive. False: no stamp for this sample.
   [[nodiscard]] bool next(Stamp mapped, Duration step, Stamp& out) {
     if (any_ && mapped <= last_) {
       if (last_ - mapped > kMostAhead) return false;

@@ -1,5 +1,5 @@
 #pragma once
-// How far stamps may be from zero where clocks are measured.
+// Range of stamps that the clock maps accept.
 
 #include <cstdint>
 
@@ -7,7 +7,7 @@
 
 namespace swiftlet {
 
-/// Stamps beyond this are refused by all that measures clocks, so that no difference overflows: 73 years.
+/// 73 years. The clock maps refuse stamps beyond it, so that differences cannot overflow.
 inline constexpr std::int64_t kStampLimit = std::int64_t{1} << 61U;
 constexpr bool withinLimit(Stamp stamp) { return stamp.ns > -kStampLimit && stamp.ns < kStampLimit; }
 

@@ -8,26 +8,28 @@
 namespace swiftlet {
 namespace {
 
-// Frames to lock on: for stamps that scatter evenly by +-0.4 periods their mean is right to 0.04 periods
-// (one sigma), to 0.08 when the lag is known from before.
+// Frames needed to lock. For stamps that scatter evenly by +-0.4 periods the standard deviation of their mean
+// is 0.04 periods, or 0.08 with fewer frames when the lag is already known.
 constexpr int kFirstLock = 32;
 constexpr int kNextLock = 8;
-constexpr double kWidest = 0.95;    // periods from the least to the largest D: a slip makes it wider
+constexpr double kWidest = 0.95;    // periods from the least to the largest D: a slip makes the range wider
 constexpr double kAmbiguous = 0.3;  // periods from the expected lag
-// A slip by one puts a scatter of 0.4 periods beyond 0.5. One after a pause of the trigger of nearly one
-// period (EdgeTrain takes 0.9) does so, too, and where stamps scatter less the bound is as much narrower, but
-// for a changing exposure.
-constexpr double kMoved = 0.25;  // periods by which the mean of the few may differ from the lag known before
+constexpr double kMoved = 0.25;  // periods: largest difference between the mean of few frames and the known
+                                 // lag
+// Bounds of |D - lag|. A slip by one pulse moves D by one period, or by 0.9 after a pause of the trigger
+// (EdgeTrain accepts 0.1 off the grid). With a scatter of 0.4 periods |D - lag| is then at least 0.5. If
+// stamps scatter less, the bound is narrower, but not below kNarrowest, so that the lag can follow a changing
+// exposure.
 constexpr double kVerified = 0.5;    // periods
 constexpr double kNarrowest = 0.35;  // periods
 constexpr double kSpreadMargin = 1.2;
 constexpr int kDisputes = 3;
-constexpr int kEdgeless = 16;  // frames: EdgeTrain bridges no longer gap either
+constexpr int kEdgeless = 16;  // frames: as many periods as EdgeTrain bridges
 constexpr double kLagGain = 1.0 / 64;
-constexpr std::int64_t kMostDropped = 1000;  // frames; more is another stream
-constexpr double kMostPeriods = 3;           // by which the count is corrected at most
-// [ns] By which an edge may seem to be later than the arrival of its frame: edges in an IMU's clock keep the
-// constant delay of its link.
+constexpr std::int64_t kMostDropped = 1000;  // frames; a larger jump is another stream
+constexpr double kMostPeriods = 3;           // largest correction of the count
+// [ns] How much later than the arrival of its frame an edge may seem: edges stamped by an IMU's clock still
+// contain the constant delay of its link.
 constexpr double kClockError = 2e6;
 
 double apart(Stamp from, Stamp to) { return static_cast<double>(to.ns - from.ns); }
@@ -35,7 +37,7 @@ double ns(Duration duration) { return static_cast<double>(duration.ns); }
 
 double clockError(double period) { return std::min(kClockError, kAmbiguous * period); }
 
-/// From one sequence number to the next, over the wrap; negative: the stream began again.
+/// Difference of two sequence numbers across the wrap; negative: the stream restarted.
 std::int64_t advance(std::uint32_t from, std::uint32_t to) { return static_cast<std::int32_t>(to - from); }
 
 }  // namespace
@@ -141,7 +143,7 @@ Status TriggerMatcher::collect(const FrameMark& frame, TriggerMatch& out) {
     lag_known_ = false;
     return {StatusCode::kDegenerate, "frames lie between two edges: correct the expected lag"};
   }
-  // This frame is handed out like the next ones: verified.
+  // From here the frame is verified and matched like all later ones.
   lock_ = LockState::kLocked;
   lag_known_ = true;
   count_ = 0;
@@ -160,7 +162,7 @@ bool TriggerMatcher::decide() {
   const double limit = lag_known_ ? kMoved : kAmbiguous;
   if (!(std::abs(lag - expected) <= limit * period) || std::abs(periods) > kMostPeriods) return false;
   if (soonest_ - periods * period < -clockError(period)) return false;
-  // The mean of a few frames is worse than what is known.
+  // The known lag is more accurate than the mean of a few frames.
   if (lag_known_) lag = lag_;
   const double centre = lag + periods * period;
   const double spread = std::max(most_ - centre, centre - least_);

@@ -11,7 +11,7 @@ constexpr double kPpm = 1e-6;
 constexpr double kAtOnce = 5e6;         // ns; as in ClockMap
 constexpr double kStepTolerance = 2e5;  // ns
 constexpr int kConfirm = 3;
-// Exchanges that agree on a new clock do so to within what it drifts between them.
+// Exchanges with the same new clock agree to within its drift between them.
 constexpr std::int64_t kConfirmSlack = 1'000'000;
 constexpr double kRaisedTolerance = 1e5;  // ns; these three as in ClockMap
 constexpr std::size_t kRaisedBins = 8;
@@ -21,7 +21,8 @@ constexpr std::int64_t kLockSpan = 4'000'000'000;
 constexpr double kLockUncertainty = 2e5;  // ns
 constexpr double kMostUncertainty = 1e9;  // ns, for the report
 constexpr std::uint64_t kFirstExchanges = 5;
-constexpr std::int64_t kLongestTrip = 10'000'000'000;  // an answer to a question long forgotten
+constexpr std::int64_t kLongestTrip = 10'000'000'000;  // a longer trip is the answer to a request long
+                                                       // forgotten
 
 }  // namespace
 

@@ -1,22 +1,23 @@
 #pragma once
-// From a remote clock to the host's CLOCK_MONOTONIC, where both sides speak (MAVLink TIMESYNC, PTP-like).
+// Maps a remote clock to the host's CLOCK_MONOTONIC from exchanges in both directions (MAVLink TIMESYNC,
+// PTP-like).
 //
-// In: exchanges (own send, remote stamp, own receive). With x the remote stamp and D(x) = host - remote:
-//   receive - x = D + back + jitter,   x - send = -D + forth + jitter,
-// two one-way links, each with its lower envelope. D is half their difference, wrong by half the asymmetry
-// (back - forth) / 2 of the constant delays; half their sum is the half of the smallest round trip, which
-// bounds the error whatever the asymmetry is.
+// Input: exchanges (own send, remote stamp, own receive). With x the remote stamp and D(x) = host - remote:
+//   receive - x = D + back + jitter,   x - send = -D + forth + jitter.
+// These are two one-way links, each with its lower envelope. D is half the difference of the envelopes; its
+// error is half the asymmetry of the constant delays, (back - forth) / 2. Half the sum is half the smallest
+// round trip, which bounds the error for any asymmetry.
 //
-// That is the usual filter of minimum round trips taken further: the smallest delays forth and back need not
-// come in the same exchange, so a slow exchange whose one half was quick still counts. Exchanges of twice the
-// smallest round trip and more are told (`slow`), as they show a loaded link.
+// The usual filter keeps only exchanges with a short round trip. Here the smallest delays in the two
+// directions need not belong to the same exchange, so a slow exchange with one quick half still helps.
+// Exchanges that take more than twice the smallest round trip are counted (`slow`): they show a loaded link.
 //
-// A remote clock that steps breaks causality on one side and delays the other. A violation of up to 5 ms
-// starts that side anew and the other follows when nothing comes near its line any more
-// (LowerEnvelope::raised); a greater one, or a remote stamp that goes back, must be confirmed by two more
-// exchanges that agree. Errors: kInvalidInput. Cost: as two LowerEnvelopes, 5 KiB. Source: V. Paxson, "On
-// calibrating measurements of packet transit times", SIGMETRICS 1998; D. L. Mills, RFC 5905 section 10 (clock
-// filter, the bound).
+// When the remote clock steps, one direction seems faster than possible and the other slower. If one is too
+// fast by up to 5 ms, its envelope restarts at once; the other restarts when no point comes near its line any
+// more (LowerEnvelope::raised). A larger step, or a remote stamp that goes back, must be confirmed by two
+// more exchanges that agree. Errors: kInvalidInput. Cost: two LowerEnvelopes; memory 5 KiB. Source: V.
+// Paxson, "On calibrating measurements of packet transit times", SIGMETRICS 1998; D. L. Mills, RFC 5905
+// section 10 (clock filter, the bound).
 
 #include <cstdint>
 #include <optional>
@@ -40,15 +41,15 @@ class TwoWayClockMap {
   explicit TwoWayClockMap(double max_skew_ppm = 150);
 
   Status add(const ClockExchange& exchange);
-  /// Host stamp of a remote stamp; not made monotonic (RisingStamps does that). Empty before the first
-  /// exchange.
+  /// Host stamp of a remote stamp; not made rising (see RisingStamps). Empty before the first exchange.
   [[nodiscard]] std::optional<Stamp> toHost(Stamp remote) const;
 
   [[nodiscard]] LockState lock() const;
-  /// Better than arrivals alone: locked, or, before it was so for the first time, after half a second at
-  /// TIMESYNC's rate, when the smallest delays to and fro are known to some tenths of a millisecond.
+  /// Whether this map is better than arrivals alone: if locked, or, before its first lock, after five
+  /// exchanges (half a second of TIMESYNC), when the smallest delays are known to some tenths of a
+  /// millisecond.
   [[nodiscard]] bool usable() const;
-  /// Residuals are of the round trip above the smallest.
+  /// Residuals: round trip above the smallest one.
   [[nodiscard]] TimesyncStatus status() const;
   [[nodiscard]] std::uint64_t slow() const { return slow_; }
 
@@ -58,7 +59,7 @@ class TwoWayClockMap {
   void watchForRise(LowerEnvelope& side);
   void learn(const ClockExchange& exchange);
   [[nodiscard]] double uncertainty(Stamp remote) const;
-  /// Twice D and twice the error bound would overflow for far stamps: the halves are taken first.
+  /// Halves are taken before subtracting: twice D would overflow for far stamps.
   [[nodiscard]] std::int64_t difference(Stamp remote) const;
 
   LowerEnvelope back_;   ///< of receive - remote
@@ -67,7 +68,7 @@ class TwoWayClockMap {
   Stamp newest_;
   int suspects_ = 0;
   Stamp suspect_newest_;
-  std::int64_t suspect_low_ = 0, suspect_high_ = 0;  ///< D lies between, by all suspects so far
+  std::int64_t suspect_low_ = 0, suspect_high_ = 0;  ///< bounds of D from all suspects so far
   std::uint64_t samples_ = 0;
   std::uint64_t resets_ = 0;
   std::uint64_t refused_ = 0;

@@ -34,7 +34,7 @@ bool WallStamps::follow(const HostClocks& now) {
   }
   const Duration step = now.realtime_ahead - clocks_->realtime_ahead;
   if (size(step) < kSmallestStep + now.error + clocks_->error) {
-    // Better read than before: the same difference.
+    // Same difference, read more accurately.
     if (now.error < clocks_->error) {
       if (difference_ == clocks_->realtime_ahead) difference_ = now.realtime_ahead;
       clocks_ = now;
@@ -84,7 +84,7 @@ WallStamps::Result WallStamps::choose(Duration delay, Duration usual) {
     in_a_row_ = 0;
     return Result::kMapped;
   }
-  // By a smaller difference the message looks late, and may be.
+  // With a smaller difference the message only looks late, and it may really be late.
   if (*other_ < difference_ && ++in_a_row_ < kEnough) return Result::kUnsure;
   in_a_row_ = 0;
   ++followed_;
