@@ -13,14 +13,14 @@
 namespace swiftlet {
 namespace {
 
-/// s, the unit of V4L2_CID_EXPOSURE_ABSOLUTE.
+/// [s], unit of V4L2_CID_EXPOSURE_ABSOLUTE.
 constexpr double kExposureUnit = 1e-4;
 constexpr double kDecibelsPerDecade = 20;
 
 struct KnownGain {
   std::string_view sensor;
   bool decibel;
-  double scale;  ///< gain = scale / (scale - code), or dB a step of the code
+  double scale;  ///< gain = scale / (scale - code), or dB per step of the code
 };
 constexpr std::array kKnownGains = {
     KnownGain{"imx214", false, 512},  KnownGain{"imx219", false, 256},  KnownGain{"imx258", false, 512},
@@ -88,7 +88,7 @@ std::optional<std::int32_t> CameraControls::read(std::uint32_t id) const {
   return control.value;
 }
 
-/// Clamped to the control's range first: drivers clamp some values and refuse others. 0 or errno.
+/// Clamps to the control's range first, because some drivers clamp and others refuse. Returns 0 or errno.
 int CameraControls::write(std::uint32_t id, std::int64_t value) const {
   const std::optional<Span> span = spanOf(id);
   if (!span) return errno == ENODEV ? ENODEV : EINVAL;
@@ -97,7 +97,7 @@ int CameraControls::write(std::uint32_t id, std::int64_t value) const {
   return port_->call(VIDIOC_S_CTRL, &control) == 0 ? 0 : errno;
 }
 
-/// Automatics that stand in the way of a value set by hand; a camera without them needs none.
+/// Disables an automatic mode that conflicts with a manual value; cameras without it need nothing.
 void CameraControls::writeIfThere(std::uint32_t id, std::int32_t value) const {
   if (spanOf(id)) static_cast<void>(write(id, value));
 }
@@ -113,14 +113,14 @@ Duration CameraControls::timeOf(std::int64_t steps) const {
   return Duration::fromSeconds(static_cast<double>(steps) * step_);
 }
 
-/// Of the control; never longer than asked.
+/// Steps of the control, rounded down.
 std::int64_t CameraControls::stepsOf(Duration exposure) const {
-  constexpr double kRounding = 1e-3;  // an exposure that was read back gives its own steps
+  constexpr double kRounding = 1e-3;  // an exposure that was read back gives the same number of steps
   return static_cast<std::int64_t>(std::floor(exposure.seconds() / step_ + kRounding));
 }
 
-/// An exposure of `lines` leaves some of the frame's lines: those between the frame's length and the
-/// control's maximum now.
+/// Lengthens the frame for an exposure of `lines`. The control's maximum is the frame's length minus a margin
+/// that stays constant.
 void CameraControls::lengthenFrame(std::int64_t lines) {
   if (lines <= exposure_span_.most) return;
   const std::optional<std::int32_t> blank = read(V4L2_CID_VBLANK);
@@ -190,7 +190,7 @@ double CameraControls::timesOf(std::int32_t code) const {
 }
 
 std::int32_t CameraControls::codeOf(double times) const {
-  // Laws rise: the largest code that gives no more.
+  // Gains rise with the code: take the largest code that gives at most `times`.
   std::int32_t low = gain_span_.least;
   std::int32_t high = gain_span_.most;
   constexpr double kRounding = 1e-9;

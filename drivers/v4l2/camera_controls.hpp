@@ -1,18 +1,17 @@
 #pragma once
-// Exposure and gain of one camera: set by hand with its automatics off, read back, or set again and again in
-// flight. What the camera lacks or clamps comes back in words.
+// Exposure and gain of one camera: set manually with automatic modes off, read back, or changed repeatedly in
+// flight. Returned faults say what the camera lacks or clamps.
 //
-// - Exposure: EXPOSURE_ABSOLUTE in 100 us, or EXPOSURE in the sensor's lines, of which one takes
-//   (width + HBLANK) / PIXEL_RATE. A frame that is too short for it is made longer (VBLANK) by setExposure(),
-//   never by set().
-// - Gain: GAIN, or ANALOGUE_GAIN. In times of the least only where the code's law is known: of the sensors
-//   listed in camera_controls.cpp, and of those whose least code is above 0, which count in its multiples
-//   (16 is 1: OV9281, OV7251, OV5647, ...).
+// - Exposure: EXPOSURE_ABSOLUTE in 100 us, or EXPOSURE in sensor lines of (width + HBLANK) / PIXEL_RATE each.
+//   setExposure() lengthens the frame (VBLANK) if it is too short for the exposure; set() never does.
+// - Gain: GAIN or ANALOGUE_GAIN. Gain as a factor of the smallest gain is available only if the relation to
+//   the code is known: for the sensors listed in camera_controls.cpp, and for sensors whose smallest code is
+//   above 0, which represents a gain of 1 (16 is 1: OV9281, OV7251, OV5647, ...).
 //
-// Memory: none but the object's. Cost: a call of the kernel for each control, which waits for the camera's
-// bus: up to some ms.
+// Memory: only the object. Cost: one system call per control, which waits for the camera's bus: up to some
+// ms.
 // Source: linux/v4l2-controls.h; the kernel's Documentation, media/v4l/ext-ctrls-image-source.rst and
-// driver-api/media/camera-sensor.rst; the laws of gains: the sensors' data sheets, as libcamera has them
+// driver-api/media/camera-sensor.rst; gain models: the sensors' data sheets, as collected in libcamera
 // (src/ipa/libipa/camera_sensor_helper.cpp).
 
 #include <cstdint>
@@ -29,24 +28,25 @@ namespace swiftlet {
 class CameraControls {
  public:
   CameraControls() = default;
-  /// What `port` offers, which must outlive this. `width` [px] of the sensor's image; `name`: the sensor's.
+  /// Reads what `port` offers; it must outlive this. `width` [px]: of the sensor's image; `name`: of the
+  /// sensor.
   CameraControls(const ControlPort& port, int width, std::string_view name);
 
-  /// An exposure in units of time can be set.
+  /// Whether an exposure in units of time can be set.
   [[nodiscard]] bool exposes() const { return exposure_id_ != 0; }
 
-  /// Automatic exposure off (and with it the habit of lowering the frame rate in the dark), then the time.
-  /// kChanged: clamped or rounded by more than one step; kUnsupported: no exposure time to set.
+  /// Disables automatic exposure (and the reduction of the frame rate in the dark), then sets the time.
+  /// kChanged: clamped or rounded by more than one step; kUnsupported: the exposure time cannot be set.
   DeviceFault setExposure(Duration exposure);
-  /// Automatic gain off, then the gain in the driver's own units.
+  /// Disables automatic gain, then sets the gain in the driver's own units.
   DeviceFault setGain(std::int32_t gain);
 
-  /// Empty: unknown to the camera.
+  /// Current values; empty: not available.
   [[nodiscard]] std::optional<Duration> exposure() const;
   [[nodiscard]] std::optional<std::int32_t> gain() const;
 
-  /// What can be set in flight within the current frame rate, and the current values; empty without
-  /// exposures.
+  /// What can be set in flight within the current frame rate, and the current values; empty if the exposure
+  /// cannot be set.
   [[nodiscard]] std::optional<ExposureAbility> ability() const;
   /// Sets exposure and gain, clamped, in one call. kFailed: the kernel's error.
   DeviceFault set(const ExposureSetting& setting);
@@ -56,7 +56,7 @@ class CameraControls {
     std::int32_t least = 0;
     std::int32_t most = 0;
   };
-  /// How a gain grows with its code.
+  /// Relation between gain and code.
   enum class GainLaw : std::uint8_t { kUnknown, kMultiple, kInverse, kDecibel };
 
   [[nodiscard]] std::optional<Span> spanOf(std::uint32_t id) const;
@@ -75,13 +75,13 @@ class CameraControls {
 
   const ControlPort* port_ = nullptr;
   std::uint32_t exposure_id_ = 0;  ///< 0: none
-  double step_ = 0;                ///< s, of the exposure's control
+  double step_ = 0;                ///< [s] per step of the exposure control
   std::uint32_t gain_id_ = 0;
   GainLaw gain_law_ = GainLaw::kUnknown;
-  double gain_scale_ = 1;  ///< of the law
+  double gain_scale_ = 1;  ///< parameter of the gain law
   Span exposure_span_;
   Span gain_span_;
-  bool manual_ = false;  ///< set() has turned automatics off
+  bool manual_ = false;  ///< set() has disabled automatic modes
 };
 
 }  // namespace swiftlet

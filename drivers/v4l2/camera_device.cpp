@@ -16,13 +16,13 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::uint32_t kMinBuffers = 4;   // one being filled, one waiting, two in the pipeline's hands
+constexpr std::uint32_t kMinBuffers = 4;   // one being filled, one waiting, two lent to the pipeline
 constexpr std::size_t kFewestBuffers = 2;  // with one, every second frame would be missed
-// A device that wraps or restarts its count goes back by nearly 2^32: no hole of this size.
+// When a device's counter wraps or restarts, the difference is near 2^32: not a gap.
 constexpr std::uint32_t kRestart = 1U << 31U;
-constexpr double kRateTolerance = 0.005;        // of the rate; drivers round intervals to us
+constexpr double kRateTolerance = 0.005;        // relative; drivers round intervals to 1 us
 constexpr std::uint32_t kRateNumerator = 1000;  // mHz resolution of rates
-constexpr std::size_t kOfferBytes = 140;        // leaves room for the words around it in a fault
+constexpr std::size_t kOfferBytes = 140;        // leaves room for the other text of a fault
 
 std::uint32_t code(std::string_view letters) {
   return v4l2_fourcc(static_cast<std::uint32_t>(letters[0]), static_cast<std::uint32_t>(letters[1]),
@@ -102,7 +102,7 @@ DeviceFault CameraDevice::chooseFormat() {
   if (node_.readFormat(before) != 0) return VideoNode::callFault(errno, "reading the format");
   DeviceFault first;
   for (const PixelFormat& candidate : kPixelFormats) {
-    // Two cameras in one image are not what an undecided user has.
+    // Formats with two cameras in one image are used only on request.
     const bool fits = asked.empty() ? candidate.layout != PixelLayout::kPairs : candidate == wanted;
     if (!fits || !offersFormat(node_, code(candidate.fourcc()))) continue;
     DeviceFault fault = setFormat(candidate, before);
@@ -121,7 +121,7 @@ DeviceFault CameraDevice::chooseFormat() {
 }
 
 DeviceFault CameraDevice::setFormat(const PixelFormat& wanted, const NodeFormat& before) {
-  // What is left open stays as the camera has it.
+  // Keep the camera's current values for settings that are not given.
   const int width = settings_.width > 0 ? settings_.width : before.width;
   const int height = settings_.height > 0 ? settings_.height : before.height;
   NodeFormat format = {code(wanted.fourcc()), width, height};
@@ -214,18 +214,18 @@ DeviceFault CameraDevice::next(CapturedFrame& frame) {
   frame.release();
   if (!isOpen())
     return deviceFault(DeviceFaultKind::kUnplugged, 0, "closed; waiting for the device to return");
-  // Each refused buffer goes back to the driver, so that one call cannot be kept busy for ever.
+  // Bounded, so that refused buffers cannot keep one call busy forever.
   for (std::size_t attempt = 0; attempt < VideoNode::kMaxBuffers; ++attempt) {
     FilledBuffer filled;
     if (!node_.dequeue(filled)) {
       if (errno != EAGAIN) return closedBy(VideoNode::callFault(errno, "taking an image (VIDIOC_DQBUF)"));
-      // A dead queue answers "nothing yet" for ever.
+      // A stopped queue would report EAGAIN forever.
       if (!node_.inError()) return {};
       return closedBy(deviceFault(DeviceFaultKind::kUnplugged, 0, "the stream ended"));
     }
     const Stamp arrival = monotonicNow();
     countSequence(filled.sequence);
-    // Of a compressed picture its decoder knows more.
+    // For a compressed image the decoder checks the data.
     const std::size_t needed =
         facts_.format.layout == PixelLayout::kJpeg
             ? 1

@@ -1,9 +1,9 @@
 #pragma once
-// A camera behind a V4L2 capture node: negotiated, streaming into the kernel's buffers, which are lent one by
-// one and return when they are released. No copy here: GreyReader makes the only one.
+// A camera behind a V4L2 capture node: negotiates the format and streams into kernel buffers, which are lent
+// one by one and returned on release. Nothing is copied here; GreyReader makes the only copy.
 //
-// Memory: the kernel's buffers (`buffers` images), mapped at open; no allocation. Cost per frame: two calls.
-// Source: linux/videodev2.h; the kernel's Documentation/userspace-api/media/v4l.
+// Memory: the kernel's buffers (`buffers` images), mapped in open(); no allocation. Cost per frame: two
+// system calls. Source: linux/videodev2.h; the kernel's Documentation/userspace-api/media/v4l.
 
 #include <cstdint>
 #include <optional>
@@ -23,7 +23,7 @@ class CameraDevice : public CameraSource {
   ~CameraDevice() override { shut(); }
 
   DeviceFault open() override;
-  /// With other settings than before.
+  /// Opens with other settings.
   DeviceFault open(const CameraDeviceSettings& settings) {
     settings_ = settings;
     return open();
@@ -44,24 +44,24 @@ class CameraDevice : public CameraSource {
   void giveBack(std::uint32_t buffer) override;
   void shut();
   DeviceFault negotiate();
-  /// The first requested or supported format that comes with the requested size and rate.
+  /// Chooses the first requested or supported format that is available with the requested size and rate.
   DeviceFault chooseFormat();
   DeviceFault setFormat(const PixelFormat& format, const NodeFormat& before);
   DeviceFault setRate();
   DeviceFault setBuffers();
   void describeDevice();
-  /// The video node's own exposure, or that of the sensor before it.
+  /// Finds the exposure controls of the video node or, if it has none, of its sensor.
   void findControls();
   void countSequence(std::uint32_t sequence);
   DeviceFault closedBy(const DeviceFault& fault);
 
   VideoNode node_;
-  SensorNode sensor_;  ///< open where the exposure is its
+  SensorNode sensor_;  ///< open if it has the exposure controls
   CameraControls controls_;
   CameraDeviceSettings settings_;
-  bool opened_ = false;          // ever
-  bool first_data_ = false;      // stampsFirstData()
-  bool sequence_known_ = false;  // of this stream
+  bool opened_ = false;          // at least once
+  bool first_data_ = false;      // result of stampsFirstData()
+  bool sequence_known_ = false;  // in this stream
   std::uint32_t raw_sequence_ = 0;
   std::uint64_t sequence_ = 0;
 };

@@ -15,14 +15,14 @@
 namespace swiftlet {
 namespace {
 
-// Bounds on what a driver may enumerate; the largest seen offers 70 formats and 30 sizes.
+// Bounds of the enumerations; the largest driver seen offers 70 formats and 30 sizes.
 constexpr std::uint32_t kMaxFormats = 128;
 constexpr std::uint32_t kMaxSizes = 64;
 constexpr std::uint32_t kMaxRates = 64;
 constexpr int kMaxNodes = 256;          // V4L2 numbers its nodes with 8 bits
 constexpr std::size_t kWordBytes = 48;  // "16x16 to 65535x65535"
 
-/// "Y16", and "Y16-BE" for the big-endian one, which the code's top bit marks.
+/// "Y16", or "Y16-BE" for big-endian, which the code's top bit marks.
 std::array<char, 8> letters(std::uint32_t code) {
   std::array<char, 8> text = {};
   std::size_t length = 0;
@@ -36,7 +36,7 @@ std::array<char, 8> letters(std::uint32_t code) {
 
 bool isTaken(std::uint32_t code) { return pixelFormat(letters(code).data()).has_value(); }
 
-/// Text of bounded length; what does not fit is left out, word by word.
+/// Text of bounded length; words that do not fit are dropped.
 class Text {
  public:
   Text(char* out, std::size_t size) : out_(out), size_(size) { out[0] = '\0'; }

@@ -1,5 +1,5 @@
 #pragma once
-// What a video node offers: in words for a refusal, and as lists for those who search for a camera.
+// Formats, sizes and rates that a video node offers: as text for a fault, and as lists for a camera search.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,8 +12,8 @@
 namespace swiftlet {
 
 [[nodiscard]] bool offersFormat(const VideoNode& node, std::uint32_t fourcc);
-/// "GREY YUYV MJPG H264": those that are taken first. These three are cut to `size` bytes with the 0, at a
-/// blank, and do not allocate.
+/// "GREY YUYV MJPG H264": supported formats first. These three functions write at most `size` bytes including
+/// the final 0, cut at a blank, and do not allocate.
 void writeFormats(const VideoNode& node, char* out, std::size_t size);
 /// "640x480 752x480": the sizes of one format.
 void writeSizes(const VideoNode& node, std::uint32_t fourcc, char* out, std::size_t size);
@@ -23,7 +23,7 @@ void writeRates(const VideoNode& node, std::uint32_t fourcc, int width, int heig
 
 struct FormatOffer {
   std::string fourcc;
-  bool taken = false;              ///< one of kPixelFormats
+  bool taken = false;              ///< a format in kPixelFormats
   std::vector<std::string> sizes;  ///< "752x480", or "16x16 to 1920x1080"
 };
 
@@ -33,10 +33,10 @@ struct CameraListing {
   std::string card;
   std::string bus;
   std::vector<FormatOffer> formats;
-  DeviceFault fault;  ///< why it could not be asked (no rights), or that it is no camera
+  DeviceFault fault;  ///< why it could not be queried (no rights), or that it is not a camera
 };
 
-/// Every /dev/video* in order of its number, with those that are no cameras. Allocates; not for flight.
+/// Every /dev/video* by number, including those that are not cameras. Allocates; not for flight.
 std::vector<CameraListing> listCameras();
 
 }  // namespace swiftlet

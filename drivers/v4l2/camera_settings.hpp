@@ -11,15 +11,15 @@
 namespace swiftlet {
 
 struct CameraDeviceSettings {
-  std::array<char, 128> path = {};  ///< "/dev/video0"; better a name that stays, from /dev/v4l/by-path
+  std::array<char, 128> path = {};  ///< "/dev/video0", or better a persistent name in /dev/v4l/by-path
   std::array<char, 5> format = {};  ///< four letters; empty: the first of kPixelFormats with size and rate
-  int width = 0;                    ///< pixels, of both halves where two cameras share an image
+  int width = 0;                    ///< pixels; if two cameras share an image, of both halves
   int height = 0;
-  double rate = 0;                   ///< frames a second; 0: as it is
-  std::optional<Duration> exposure;  ///< manual; empty: as it is
-  std::optional<std::int32_t> gain;  ///< the driver's own units, manual; empty: as it is
+  double rate = 0;                   ///< frames per second; 0: unchanged
+  std::optional<Duration> exposure;  ///< manual; empty: unchanged
+  std::optional<std::int32_t> gain;  ///< manual, in the driver's own units; empty: unchanged
   std::uint32_t buffers = 6;         ///< 4 to VideoNode::kMaxBuffers
-  bool require_monotonic = true;     ///< false: where the driver's clock is unknown, arrivals are stamps
+  bool require_monotonic = true;     ///< false: if the driver's clock is unknown, arrivals are used as stamps
 
   void setPath(const char* text);
   void setFormat(const char* text);

@@ -1,5 +1,5 @@
 #pragma once
-// Something whose V4L2 controls are called: a video node, a sensor's own node, a test's.
+// Interface for V4L2 control calls: to a video node, a sensor's subdevice or a test double.
 
 namespace swiftlet {
 
@@ -10,7 +10,7 @@ class ControlPort {
   ControlPort& operator=(const ControlPort&) = delete;
   virtual ~ControlPort() = default;
 
-  /// ioctl, again when a signal came in between; -1 and errno else.
+  /// ioctl, repeated if a signal interrupts it. Returns -1 and sets errno on failure.
   virtual int call(unsigned long request, void* argument) const = 0;
 };
 

@@ -13,13 +13,13 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kMaxMedia = 128;  // entities, interfaces, pads or links; a Jetson's graph has some 60
+constexpr std::size_t kMaxMedia = 128;  // entities, interfaces, pads or links; a Jetson's graph has about 60
 constexpr int kMediaDevices = 16;
 constexpr int kSubdevices = 128;
 
 template <typename T>
 const T* byId(std::span<const T> all, std::uint32_t id) {
-  // The kernel's structures are packed: no references to their members.
+  // The kernel's structures are packed, so no reference to a member can be taken.
   const auto found = std::ranges::find_if(all, [&](const T& element) { return element.id == id; });
   return found == all.end() ? nullptr : &*found;
 }
@@ -29,7 +29,7 @@ bool isInterfaceLink(const media_v2_link& link) {
   return (link.flags & kType) == MEDIA_LNK_FL_INTERFACE_LINK;
 }
 
-/// The other end of an interface's link, whichever it is; 0: none.
+/// The entity at the other end of an interface's link; 0: none.
 std::uint32_t entityOf(const MediaGraph& graph, std::uint32_t interface) {
   const auto link = std::ranges::find_if(
       graph.links, [&](const media_v2_link& l) { return isInterfaceLink(l) && l.source_id == interface; });
@@ -45,7 +45,7 @@ std::optional<NodeNumber> nodeOf(const MediaGraph& graph, std::uint32_t entity) 
   return std::nullopt;
 }
 
-/// A graph and the memory that it lies in.
+/// A media graph with its storage.
 struct ReadGraph {
   std::array<media_v2_entity, kMaxMedia> entities = {};
   std::array<media_v2_interface, kMaxMedia> interfaces = {};
@@ -94,7 +94,7 @@ std::optional<FoundSensor> sensorBefore(const MediaGraph& graph, NodeNumber vide
            NodeNumber{interface.devnode.major, interface.devnode.minor} == video;
   });
   if (own == graph.interfaces.end()) return std::nullopt;
-  // Entities that the video node's images come through, nearest first.
+  // Entities upstream of the video node, nearest first.
   std::array<std::uint32_t, kMaxMedia> way{};
   std::size_t count = 0;
   way[count++] = entityOf(graph, own->id);

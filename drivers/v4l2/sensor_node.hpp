@@ -1,10 +1,10 @@
 #pragma once
-// The image sensor in front of a video node: its own node, which has the exposure and gain of raw cameras,
-// found by walking the kernel's media graph upstream.
+// Finds the image sensor of a video node by walking the kernel's media graph upstream. For raw cameras,
+// exposure and gain are controls of the sensor's own subdevice.
 //
-// Memory: 30 kB of stack while a graph is read; no allocation. A graph of more than 128 entities, interfaces,
-// pads or links is not read.
-// Source: linux/media.h; the kernel's Documentation, media/mediactl/media-ioc-g-topology.rst.
+// Memory: 30 kB of stack while a graph is read; no allocation. A graph with more than 128 entities,
+// interfaces, pads or links is not read. Source: linux/media.h; the kernel's Documentation,
+// media/mediactl/media-ioc-g-topology.rst.
 
 #include <linux/media.h>
 
@@ -30,13 +30,13 @@ struct NodeNumber {
   [[nodiscard]] constexpr bool operator==(const NodeNumber&) const = default;
 };
 
-/// A sensor's name, as "imx219 10-0010", and its node.
+/// A sensor's name, such as "imx219 10-0010", and its node.
 struct FoundSensor {
   std::array<char, 64> name = {};
   NodeNumber node;
 };
 
-/// The sensor whose images reach `video` over enabled links; empty: none, or one without a node.
+/// The sensor whose images reach `video` over enabled links; empty: no sensor, or one without a node.
 [[nodiscard]] std::optional<FoundSensor> sensorBefore(const MediaGraph& graph, NodeNumber video);
 
 class SensorNode : public ControlPort {
@@ -44,13 +44,13 @@ class SensorNode : public ControlPort {
   SensorNode() = default;
   ~SensorNode() override { close(); }
 
-  /// False: no sensor was found before this video node, or its node cannot be opened.
+  /// False: no sensor was found upstream of this video node, or its node cannot be opened.
   bool openBefore(int video_fd);
   void close();
 
   int call(unsigned long request, void* argument) const override { return callNode(fd_, request, argument); }
   [[nodiscard]] const char* name() const { return sensor_.name.data(); }
-  /// Of the sensor's images, px; 0: unknown.
+  /// Width of the sensor's images [px]; 0: unknown.
   [[nodiscard]] int width() const;
 
  private:

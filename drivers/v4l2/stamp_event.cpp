@@ -19,7 +19,7 @@ bool stampsFirstData(std::string_view driver, const char* parameter) {
 StampEvent stampEvent(std::uint32_t flags, bool first_data) {
   if ((flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
     return StampEvent::kArrival;
-  // A sensor's first row is read out when its exposure ends.
+  // The first row's readout starts when its exposure ends.
   if (first_data) return StampEvent::kEndOfExposure;
   return (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE
              ? StampEvent::kStartOfExposure

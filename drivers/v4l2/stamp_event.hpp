@@ -1,6 +1,6 @@
 #pragma once
-// Which instant the stamp of a V4L2 buffer marks: what its flags say, except where the driver flags another
-// instant than it stamps.
+// The event that the stamp of a V4L2 buffer marks: as its flags say, except for drivers whose flags are
+// wrong.
 
 #include <cstdint>
 #include <string_view>
@@ -9,7 +9,7 @@
 
 namespace swiftlet {
 
-/// Parameter of the module uvcvideo: 0, the default, stamps with the host's time.
+/// Parameter of the module uvcvideo: 0, the default, stamps with the host's clock.
 inline constexpr const char* kUvcHardwareStamps = "/sys/module/uvcvideo/parameters/hwtimestamps";
 
 /// Whether the driver stamps the arrival of a frame's first data, whatever its flags say. uvcvideo flags all

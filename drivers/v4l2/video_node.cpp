@@ -15,7 +15,7 @@
 namespace swiftlet {
 namespace {
 
-// A signal may interrupt a call; without end only if signals come without end.
+// A signal may interrupt a call; this many in a row end it.
 constexpr int kMaxInterruptions = 100;
 
 struct Way {
@@ -23,14 +23,14 @@ struct Way {
   std::uint32_t type;
 };
 
-/// One plane of memory before several, where a node can do both.
+/// A single-planar interface is preferred if a node has both.
 constexpr std::array<Way, 2> kCaptures = {
     {{V4L2_CAP_VIDEO_CAPTURE, V4L2_BUF_TYPE_VIDEO_CAPTURE},
      {V4L2_CAP_VIDEO_CAPTURE_MPLANE, V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE}}};
 constexpr std::array<Way, 2> kOutputs = {{{V4L2_CAP_VIDEO_OUTPUT, V4L2_BUF_TYPE_VIDEO_OUTPUT},
                                           {V4L2_CAP_VIDEO_OUTPUT_MPLANE, V4L2_BUF_TYPE_VIDEO_OUTPUT_MPLANE}}};
 
-/// A call's buffer with the planes that it points to.
+/// Arguments of a call: a buffer and the planes that it points to.
 struct Request {
   Request(std::uint32_t type, bool several) {
     buffer.type = type;
@@ -118,7 +118,7 @@ int VideoNode::readFormat(NodeFormat& format) const {
   if (call(VIDIOC_G_FMT, &f) != 0) return -1;
   const v4l2_pix_format& one = f.fmt.pix;
   const v4l2_pix_format_mplane& several = f.fmt.pix_mp;
-  // The members have the same names and stand at other places.
+  // Both structures have the same members at different offsets.
   const auto read = [&](const auto& pix, std::uint32_t stride) {
     format = {pix.pixelformat, static_cast<int>(pix.width), static_cast<int>(pix.height),
               static_cast<int>(stride), pix.field == V4L2_FIELD_NONE || pix.field == V4L2_FIELD_ANY};
@@ -134,7 +134,7 @@ int VideoNode::readFormat(NodeFormat& format) const {
 int VideoNode::setFormat(NodeFormat& format) const {
   v4l2_format f = {};
   f.type = type_;
-  // Whatever else a driver keeps there stays as it is.
+  // Keep all other fields as the driver has set them.
   if (call(VIDIOC_G_FMT, &f) != 0) return -1;
   const auto write = [&](auto& pix) {
     pix.pixelformat = format.fourcc;
@@ -160,7 +160,7 @@ DeviceFault VideoNode::mapBuffers(std::uint32_t count) {
   request.type = type_;
   request.memory = V4L2_MEMORY_MMAP;
   if (call(VIDIOC_REQBUFS, &request) != 0) return callFault(errno, "requesting buffers (VIDIOC_REQBUFS)");
-  // Some drivers give more than they are asked for.
+  // Some drivers allocate more buffers than requested.
   const std::size_t given = std::min<std::size_t>(request.count, kMaxBuffers);
   for (std::size_t i = 0; i < given; ++i) {
     Request asked(type_, severalPlanes());

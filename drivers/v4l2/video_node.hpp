@@ -1,7 +1,6 @@
 #pragma once
-// An open video node and its mapped buffers: what capture and output have in common, and nodes whose images
-// are of one plane of memory or of several. Of several the first, which has the luma, is mapped. Closes and
-// unmaps itself.
+// An open video node and its mapped buffers, for capture and output, single-planar and multi-planar. Of
+// several planes only the first, which has the luma, is mapped. The destructor unmaps and closes.
 
 #include <array>
 #include <cstddef>
@@ -14,12 +13,12 @@
 
 namespace swiftlet {
 
-/// What a node gives or takes, as in v4l2_pix_format.
+/// Format of a node, as in v4l2_pix_format.
 struct NodeFormat {
   std::uint32_t fourcc = 0;
   int width = 0;      ///< pixels
   int height = 0;     ///< pixels
-  int stride = 0;     ///< bytes from row to row, as the driver has it
+  int stride = 0;     ///< bytes per row, as the driver sets it
   bool whole = true;  ///< false: interlaced
 };
 
@@ -34,7 +33,7 @@ struct FilledBuffer {
 
 class VideoNode : public ControlPort {
  public:
-  /// What the room holds; drivers give 2 to 32, more than 8 only delays.
+  /// Capacity of this class; drivers give 2 to 32, and more than 8 only add delay.
   static constexpr std::size_t kMaxBuffers = 8;
 
   VideoNode() = default;
@@ -42,36 +41,38 @@ class VideoNode : public ControlPort {
 
   enum class Role : std::uint8_t { kCapture, kOutput };
 
-  /// Non-blocking. A node that cannot stream in this role is rejected, and the fault says what it is.
+  /// Opens in non-blocking mode. A node that cannot stream in this role is refused; the fault says what it
+  /// is.
   DeviceFault open(const char* path, Role role);
   void close();
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] bool isOpen() const { return fd_ >= 0; }
-  /// V4L2_BUF_TYPE_..., for calls made elsewhere.
+  /// V4L2_BUF_TYPE_..., for other callers.
   [[nodiscard]] std::uint32_t type() const { return type_; }
 
   int call(unsigned long request, void* argument) const override { return callNode(fd_, request, argument); }
-  /// The fault of the call that just failed: gone, busy, or the kernel's words. `what` names the call.
+  /// The fault of a failed call: unplugged, busy, or the kernel's error text. `what` names the call.
   [[nodiscard]] static DeviceFault callFault(int error, const char* what);
 
-  /// As the node has it. 0; -1 and errno.
+  /// The node's current format. Returns 0, or -1 and errno.
   int readFormat(NodeFormat& format) const;
-  /// Requests complete images without padding; afterwards the driver's choice. Returns 0, or -1 and errno.
+  /// Requests complete images without padding; `format` then holds the driver's choice. Returns 0, or -1 and
+  /// errno.
   int setFormat(NodeFormat& format) const;
 
-  /// Asks for and maps `count` buffers; as many as the driver gave afterwards.
+  /// Requests `count` buffers and maps as many as the driver allocates.
   DeviceFault mapBuffers(std::uint32_t count);
   [[nodiscard]] std::size_t bufferCount() const { return buffer_count_; }
   [[nodiscard]] std::span<std::uint8_t> buffer(std::size_t index) const { return buffers_[index]; }
-  /// The flags that the driver gives with its stamps, known once buffers are mapped.
+  /// The driver's timestamp flags, known once buffers are mapped.
   [[nodiscard]] std::uint32_t stampFlags() const { return stamp_flags_; }
 
   DeviceFault start();
-  /// Hands a buffer to the driver. `used`: bytes of an output's image. False, and errno.
+  /// Passes a buffer to the driver. `used`: image bytes of an output buffer. On failure false and errno.
   [[nodiscard]] bool queue(std::uint32_t index, std::size_t used = 0) const;
-  /// The next buffer that the driver has finished. False, and errno: EAGAIN if there is none.
+  /// Takes the next finished buffer from the driver. On failure false and errno: EAGAIN if there is none.
   [[nodiscard]] bool dequeue(FilledBuffer& filled) const;
-  /// True: poll() reports an error or a hang-up; no more images will arrive.
+  /// Whether poll() reports an error or a hang-up: no more images will arrive.
   [[nodiscard]] bool inError() const;
 
  private:

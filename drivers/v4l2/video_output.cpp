@@ -10,7 +10,7 @@ namespace swiftlet {
 namespace {
 
 constexpr std::uint32_t kBuffers = 4;
-constexpr std::size_t kStartWith = 2;  // with one, the driver would show it twice
+constexpr std::size_t kStartWith = 2;  // with only one the driver would show it twice
 
 }  // namespace
 

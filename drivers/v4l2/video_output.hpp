@@ -1,10 +1,10 @@
 #pragma once
-// Writes 8-bit images to a V4L2 output node, which shows them on a capture node (vivid's loop, v4l2loopback):
-// how a recorded flight gets into a camera. Not for flight.
+// Writes 8-bit images to a V4L2 output node that feeds a capture node (vivid's loop, v4l2loopback), to replay
+// a recorded flight through a camera device. Not for flight.
 //
-// Threads: one. Nothing waits: poll fd() for POLLOUT, or ask canWrite().
-// The driver shows an image for as long as no newer one is there, and holds the last ones back: keep two or
-// more queued, and write the last image again `kHeldBack` times at the end.
+// Threads: one. Nothing blocks: poll fd() for POLLOUT, or check canWrite(). The driver repeats an image until
+// a newer one is queued and holds the last ones back: keep two or more queued, and write the last image
+// `kHeldBack` more times at the end.
 
 #include <cstdint>
 
@@ -19,16 +19,16 @@ class VideoOutput {
   /// Images that may never be shown after the last write.
   static constexpr int kHeldBack = 4;
 
-  /// GREY of this size, no other is accepted.
+  /// Requires GREY of exactly this size.
   DeviceFault open(const char* path, int width, int height);
   void close() { node_.close(); }
   [[nodiscard]] bool isOpen() const { return node_.isOpen(); }
   [[nodiscard]] int fd() const { return node_.fd(); }
 
-  /// Takes back what has been shown. False: all buffers wait to be shown.
+  /// Reclaims buffers that have been shown. False: all buffers are still waiting to be shown.
   [[nodiscard]] bool canWrite();
-  /// Copies the image; the node starts with the second one. kUnsupported: wrong size; kBusy: no buffer is
-  /// free.
+  /// Copies and queues the image; the node starts with the second one. kUnsupported: wrong size; kBusy: no
+  /// free buffer.
   DeviceFault write(const ImageView& image);
   /// Images written and not yet shown.
   [[nodiscard]] std::size_t queued() const { return queued_; }
@@ -42,7 +42,7 @@ class VideoOutput {
   int stride_ = 0;
   bool started_ = false;
   std::size_t queued_ = 0;
-  std::uint32_t free_ = 0;  // a bit for each buffer
+  std::uint32_t free_ = 0;  // one bit per buffer
 };
 
 }  // namespace swiftlet
