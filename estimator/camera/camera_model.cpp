@@ -9,10 +9,10 @@ namespace {
 
 constexpr int kMaxNewtonSteps = 20;
 constexpr double kNewtonTolerance = 1e-12;
-// Residual on the plane z = 1 that ends the inversion of a radial-tangential lens: 5e-9 px, far below the
-// resolution of a float's pixel.
+// Residual on the plane z = 1 at which the inversion of a radial-tangential lens ends: 5e-9 px, far below the
+// resolution of a pixel coordinate in float.
 constexpr double kMaxResidual = 1e-11;
-// A radial-tangential lens never sees beyond 85 degrees usefully: the tangent explodes.
+// Radial-tangential lenses are limited to 85 degrees, where the tangent diverges.
 constexpr double kMaxRadtanTheta = 1.483;
 constexpr double kThetaStep = 1e-3;
 
@@ -34,8 +34,8 @@ double equidistantFoldAngle(const Eigen::Vector4d& k) {
   return std::numbers::pi - kThetaStep;
 }
 
-// Whether a point at this distance from the axis, squared, and this depth lies within the angle. A tangent is
-// above the first terms of its series, so that few points need it.
+// Whether a point with this squared distance from the axis and this depth lies within the angle. The first
+// terms of the tangent's series are a lower bound, so few points need the tangent itself.
 bool within(double max_theta, double radius_squared, double z) {
   const double below = max_theta * (1.0 + max_theta * max_theta / 3.0) * z;
   if (radius_squared < below * below) return true;

@@ -1,12 +1,12 @@
 #pragma once
 // One camera: pinhole with radial-tangential distortion, or Kannala-Brandt equidistant.
 //
-// Frames: the camera looks along +z, x right, y down; pixel (0,0) is the centre of the top-left
-// pixel. Models (u = fx xd + cx, v = fy yd + cy):
-//  - radial-tangential (Brown; OpenCV's first four coefficients), valid for z > 0 and inside the
-//    radius where the radial polynomial is monotonic; beyond it points fold back into the image.
-//  - equidistant (Kannala, Brandt, PAMI 2006): theta_d = theta (1 + k1 theta^2 + ... + k4 theta^8),
-//    (xd, yd) = theta_d (x, y) / |(x, y)|; valid up to `maxTheta()`, which may exceed 90 degrees.
+// Frames: the camera looks along +z, x right, y down; pixel (0,0) is the centre of the top-left pixel. Models
+// (u = fx xd + cx, v = fy yd + cy):
+//  - radial-tangential (Brown; OpenCV's first four coefficients), valid for z > 0 and inside the radius where
+//    the radial polynomial is monotonic; beyond it points fold back into the image.
+//  - equidistant (Kannala, Brandt, PAMI 2006): theta_d = theta (1 + k1 theta^2 + ... + k4 theta^8), (xd, yd)
+//    = theta_d (x, y) / |(x, y)|; valid up to `maxTheta()`, which may exceed 90 degrees.
 // Projection costs about 8 ns; unprojection, by Newton's method in at most 20 steps, about 50 ns.
 
 #include <Eigen/Core>
@@ -35,9 +35,9 @@ class CameraModel {
   /// Largest angle from the optical axis [rad] at which the model can be inverted.
   [[nodiscard]] double maxTheta() const { return max_theta_; }
 
-  /// Projects a point in the camera frame [m] to a pixel, which may be outside the image. False
-  /// outside the model's valid set (behind a pinhole, past the fold, NaN). `jacobian`, if given, is
-  /// d pixel / d point.
+  /// Projects a point in the camera frame [m] to a pixel, which may be outside the image. False outside the
+  /// model's valid range (behind a pinhole, beyond the fold, NaN). `jacobian`, if given, is d pixel / d
+  /// point.
   [[nodiscard]] bool project(const Eigen::Vector3d& p_cam, Eigen::Vector2d& pixel,
                              Matrix23d* jacobian = nullptr) const;
 

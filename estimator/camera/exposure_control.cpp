@@ -9,28 +9,29 @@ namespace {
 constexpr int kRowStep = 8;
 constexpr int kColumnStep = 4;
 constexpr std::size_t kGreys = 256;
-/// Grey from which a pixel is near white: noise and the camera's own curve hide the last levels.
+/// Grey value from which a pixel counts as white: noise and the camera's response hide the last levels.
 constexpr std::size_t kBright = 250;
-constexpr double kBrightTarget = 235;  ///< grey that the brightest pixels but kSaturatedShare may reach
-/// An image that is white all over may have any brightness: ask for a fifth.
+constexpr double kBrightTarget = 235;  ///< grey value above which only kSaturatedShare of the pixels may be
+/// A completely white image can have any brightness: request a fifth of the light.
 constexpr double kWhiteLoss = 0.8;
 constexpr double kMostFactor = 10;
 
-/// Of the way to what is wanted, an image: requests that act a frame later or earlier than supposed do not
-/// make it swing.
+/// Share of the correction applied per image, so that requests that take effect a frame earlier or later than
+/// assumed cause no oscillation.
 constexpr double kDamping = 0.5;
-/// ln of the light, an image: at most this near the target, where tracks would suffer from more...
+/// Largest step per image [ln of light] near the target, where larger steps would disturb tracking...
 constexpr double kSmallStep = 0.1;
-/// ...and this far from it, where they suffer from the wrong light.
+/// ...and far from it, where wrong light disturbs it more.
 constexpr double kLargeStep = 0.35;
-constexpr double kStepShare = 0.25;  ///< of the distance from the target, between the two
+constexpr double kStepShare = 0.25;  ///< step as a share of the distance from the target, between these
+                                     ///< bounds
 
-constexpr double kTurnMemory = 1.0;  ///< s: a vehicle that turned will turn again
-/// ln of the exposure's bound, an image. The brightness stays, but some sensors take a gain an image before
-/// the exposure.
+constexpr double kTurnMemory = 1.0;  ///< s; a vehicle that turned is likely to turn again
+/// Largest change of the exposure's limit per image [ln]. The brightness stays constant, but some sensors
+/// apply a gain one image before the exposure.
 constexpr double kBoundStep = 0.15;
-constexpr double kStepRounding = 1e-6;  // a multiple of the step is one
-constexpr double kPeriodShare = 0.9;    ///< of the period that an exposure may take
+constexpr double kStepRounding = 1e-6;  // tolerance for a multiple of the step
+constexpr double kPeriodShare = 0.9;    ///< largest exposure as a share of the period
 
 double lightOf(const ExposureSetting& setting) { return setting.exposure.seconds() * setting.gain; }
 
@@ -114,7 +115,7 @@ ExposureSetting ExposureControl::update(std::uint64_t frame, double missing, dou
   const double least = range_.shortest.seconds();
   double step = 0;
   if (std::abs(off) > kDeadband) {
-    // The light that this image ought to have had, against what was asked for since.
+    // The light that this image should have had, relative to what was requested since.
     const double wanted = off + std::log(std::max(lightOf(inForce(frame)), least) / light_);
     const double largest = std::clamp(kStepShare * std::abs(off), kSmallStep, kLargeStep);
     step = std::clamp(kDamping * wanted, -largest, largest);

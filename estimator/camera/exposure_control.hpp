@@ -1,13 +1,13 @@
 #pragma once
-// Exposure and gain of a rig's next images, from the newest image, for odometry.
+// Controls exposure and gain of a rig's next images, from the newest image, for odometry.
 //
-// - Metering, on every 8th row: controls the mean grey value to kTargetMean, unless more than kSaturatedShare
-//   of the pixels would be nearly white; then these decide.
-// - Motion blur: limits the exposure to kBlur / (focal turn_rate); further light comes from the gain. If the
+// - Metering, on every 8th row: the mean grey value is controlled to kTargetMean, unless more than
+//   kSaturatedShare of the pixels would be nearly white; then these decide.
+// - Motion blur: the exposure is limited to kBlur / (focal turn_rate); more light comes from the gain. If the
 //   gain is at its limit too, the exposure may grow up to kDarkBlur.
 // - A request takes effect kActingDelay images later. An image is metered with the settings that it was taken
 //   with, and pending requests are taken into account, so the control does not wind up.
-// - Exposures are multiples of the camera's step; the gain compensates the remainder.
+// - Exposures are multiples of the camera's step; the gain compensates for the remainder.
 // - Changes: none within kDeadband, at most 10 % per image near the target, up to 40 % far from it.
 //
 // Units: gain is relative to the sensor's least gain; light is exposure times gain [s].
@@ -49,7 +49,7 @@ class ExposureControl {
   static constexpr double kSaturatedShare = 0.05;  ///< of pixels: lamps and windows
   static constexpr double kBlur = 1.5;             ///< px; tracking hardly degrades below 2
   static constexpr double kDarkBlur = 4;           ///< px; a blurred image is better than a black one
-  /// rad/s, assumed if the vehicle does not turn: 1 m/s at 3 m moves pixels as fast.
+  /// rad/s, assumed at least, also for vehicles that do not turn: 1 m/s at 3 m moves pixels as fast.
   static constexpr double kLeastTurnRate = 0.3;
   static constexpr double kDeadband = 0.1;  ///< of the light
   /// When a request is sent, the next image is already being exposed.
@@ -83,7 +83,7 @@ class ExposureControl {
 
   ExposureRange range_;
   double focal_ = 1;
-  double turn_decay_ = 0;  ///< an image
+  double turn_decay_ = 0;  ///< per image
   double turn_rate_ = kLeastTurnRate;
   double bound_ = 0;  ///< s, exposure at kBlur
   double light_ = 0;  ///< s, wanted light; the requested light is smaller by a part of a step

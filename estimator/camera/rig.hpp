@@ -18,13 +18,13 @@ struct Rig {
   std::array<SE3, kMaxCameras> T_body_cam;  ///< camera to body
   /// t_imu = t_image + shift (Kalibr's timeshift_cam_imu), one value for the rig.
   Duration camera_to_imu_shift;
-  /// How much larger the shift may be found in flight; zero where it is not estimated.
+  /// How much larger the shift can become when it is estimated in flight; zero if it is not estimated.
   Duration shift_margin;
   /// Time from the first to the last row of a rolling shutter, the same for both cameras; zero: global
   /// shutter. The stamp of an image is that of its middle row.
   Duration readout;
 
-  /// How far beyond the stamp of an image, read as one of the IMU's, its samples reach.
+  /// How long after an image's stamp, as a time of the IMU's clock, samples are still needed.
   [[nodiscard]] Duration sampleLead() const {
     return std::max(camera_to_imu_shift + shift_margin, Duration{});
   }
