@@ -5,22 +5,24 @@
 //
 // Threads: one producer calls push, one consumer calls tryPop; any thread may call size() and dropped().
 // Values: small and trivially copyable (handles), stored as atomic words.
-// Memory: kCapacity values inside the object and one cache line a side.
+// Memory: kCapacity values inside the object and one cache line per side.
 // Cost: push is O(1) and wait-free, with one compare-exchange if the ring is full. tryPop takes one
-//   compare-exchange; it starts again if a push dropped the value that it was taking, at most kPopAttempts
-//   times, each of which takes the producer a whole push.
+// compare-exchange. It restarts if a push dropped the value that it was taking, at most kPopAttempts times;
+// each restart takes the producer one complete push.
 //
-// Alternatives. Letting the consumer skip to the newest N would drop the newest if the consumer is stopped
-// for longer than the ring lasts. An overwriting ring in which the consumer finds torn values leaves the
+// Alternatives. Letting the consumer skip to the newest N would drop the newest values if the consumer stops
+// for longer than the ring lasts. An overwriting ring in which the consumer detects torn values leaves the
 // ownership of overwritten values open. Here producer and consumer claim the oldest value by the same
 // compare-exchange of `tail` from t to t + 1. Exactly one wins, so a value is either taken or dropped, and
-// values leave in order. Why a taken value is complete: the consumer first copies value t and then claims it.
-// Its cell is overwritten only after the producer knows a tail beyond t. If the producer moved the tail
-// itself, the claim fails and the copy is discarded. If it saw the consumer's claim, that release, acquired,
-// orders the copying before the overwriting. The words of a cell are atomic, so a discarded copy is no data
-// race. (The tail does not wrap around to the same 64-bit value between copy and claim.) Capacity 1: between
-// dropping and publishing, the consumer may find the ring empty for some nanoseconds; the producer announces
-// the following value as usual.
+// values leave in order.
+//
+// Why a taken value is complete: the consumer first copies value t and then claims it. The cell is
+// overwritten only after the producer knows a tail beyond t. If the producer moved the tail itself, the claim
+// fails and the copy is discarded. If it saw the consumer's claim, the acquire of that release orders the
+// copying before the overwriting. The words of a cell are atomic, so a discarded copy is no data race. (The
+// tail does not wrap around to the same 64-bit value between copy and claim.) Capacity 1: between dropping
+// and publishing, the consumer may find the ring empty for some nanoseconds; the producer announces the
+// following value as usual.
 
 #include <array>
 #include <cstddef>
@@ -37,8 +39,8 @@ class DropOldestRing {
 
  public:
   using value_type = T;
-  /// After this many failed attempts tryPop reports an empty ring: as many values were dropped as most rings
-  /// hold.
+  /// After this many failed attempts tryPop reports an empty ring; by then about a full ring of values was
+  /// dropped.
   static constexpr int kPopAttempts = 8;
 
   DropOldestRing() = default;
@@ -62,7 +64,7 @@ class DropOldestRing {
 
   /// Consumer. False, with `out` unchanged, if empty (or after kPopAttempts failed attempts).
   [[nodiscard]] bool tryPop(T& out) {
-    // Acquired, as below, so that the head read next is not behind a tail that the producer moved.
+    // Acquire, so that the head read next is not older than a tail that the producer moved.
     std::uint64_t tail = tail_.load(std::memory_order_acquire);
     for (int attempt = 0; attempt < kPopAttempts; ++attempt) {
       if (producer_.published.load(std::memory_order_acquire) == tail) return false;
@@ -94,7 +96,8 @@ class DropOldestRing {
     EventCount dropped;
   };
 
-  /// Moves the tail past the oldest value, unless the consumer has done so. Either way there is room for one.
+  /// Moves the tail past the oldest value unless the consumer has already done so. Afterwards there is room
+  /// for one value.
   bool claimOldest() {
     const std::uint64_t oldest = producer_.tail_seen;
     if (tail_.compare_exchange_strong(producer_.tail_seen, oldest + 1, std::memory_order_release,

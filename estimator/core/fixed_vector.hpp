@@ -18,7 +18,7 @@ class FixedVector {
   [[nodiscard]] bool empty() const { return size_ == 0; }
   [[nodiscard]] bool full() const { return size_ == kCapacity; }
 
-  /// Appends if the caller knows that there is room; without room nothing changes.
+  /// Appends. The caller must know that there is room; if there is none, nothing changes.
   void pushBack(const T& value) {
     assert(!full());
     if (!full()) items_[size_++] = value;
@@ -34,7 +34,7 @@ class FixedVector {
     assert(size_ > 0);
     --size_;
   }
-  /// Keeps the first `size` elements, or grows; new elements have the values left in their slots.
+  /// Keeps the first `size` elements, or grows; new elements have the old content of their slots.
   void resize(std::size_t size) {
     assert(size <= kCapacity);
     size_ = size;

@@ -2,20 +2,20 @@
 // Passes the newest value from one thread to one other: a triple buffer. Wait-free on both sides (one
 // exchange each); neither waits for the other or retries because of it.
 //
-// Threads: one writer calls draft, publish, write; one reader calls refresh, value, sequence, read.
-//   Several readers: one Newest each, written in turn (small trivially copyable values: NewestShared).
+// Threads: one writer calls draft, publish, write; one reader calls refresh, value, sequence, read. For
+// several readers use one Newest each, or NewestShared for small trivially copyable values.
 // Values: anything default-constructible and assignable, including Eigen members; written and read in place.
-//   Values that the reader did not take are overwritten; sequence numbers show how many there were.
+// Values that the reader did not take are overwritten; sequence numbers show how many there were.
 // Sequence: values are numbered from 1 in the order of publishing; 0 means that nothing was published yet.
 //   The reader records the number of each value that it read, so that a run can be repeated.
 // Memory: three values inside the object, each in its own cache lines.
 // Cost: O(1); a refresh without a new value is one load.
 //
-// Why it is correct: the writer owns one of three buffers, the reader another, and the third changes owner
-// through `middle_` by exchange. Release publishes what a thread did to the buffer that it gives, acquire
-// shows what the other did to the buffer that it gets. No buffer ever has two owners, and the one in the
-// middle is the newest published or the one that the reader returned. (The exchange is one instruction on
-// x86-64 and ARMv8.1; before that a load-linked pair, which the hardware may repeat.)
+// Why it is correct: the writer owns one of three buffers, the reader another, and the third changes owner by
+// exchange of `middle_`. Release publishes what a thread did to the buffer that it gives away; acquire shows
+// what the other thread did to the buffer that it gets. No buffer ever has two owners, and the middle one is
+// the newest published or the one that the reader returned. (The exchange is one instruction on x86-64 and
+// ARMv8.1; before that a load-linked pair, which the hardware may repeat.)
 
 #include <array>
 #include <cstdint>

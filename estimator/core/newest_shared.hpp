@@ -3,16 +3,16 @@
 // writer interrupted in the middle of a write does not block readers.
 //
 // Threads: one writer calls write; any thread calls read.
-// Values: trivially copyable and small (tens of words); for others, and for values with Eigen members, use
-// one
-//   Newest per reader.
+// Values: trivially copyable and small (tens of words). For others, and for values with Eigen members, use
+// one Newest per reader.
 // Sequence: values are numbered from 1; 0 means none. A thread never reads an older value than it read
-// before. Memory: kCells values inside the object. Cost: write is wait-free, one store per word and two more;
-// read is one load per word and two more. Overtaken: a read is discarded if the writer began the kCells-th
-// write after it while it copied. With four
-//   cells, the default, this needs a reader that is stopped between two words for three periods of the
-//   writer. After kReadAttempts attempts the read returns 0, which is counted, and the reader continues with
-//   the value that it has.
+// before.
+// Memory: kCells values inside the object.
+// Cost: write is wait-free, one store per word and two more; read is one load per word and two more.
+// Overtaken: a read is discarded if the writer began the kCells-th write after it while it copied. With four
+// cells, the default, this requires that a reader is stopped between two words for three periods of the
+// writer. After kReadAttempts attempts the read returns 0, which is counted, and the reader keeps the value
+// that it has.
 //
 // Source: H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012: atomic
 // words; instead of fences the words are release stores and acquire loads, which order at least as much.
@@ -67,7 +67,7 @@ class NewestShared {
     return 0;
   }
 
-  /// Number of reads of which every attempt was overtaken.
+  /// Number of reads in which every attempt was overtaken.
   [[nodiscard]] std::uint64_t overtaken() const { return overtaken_.load(std::memory_order_relaxed); }
 
  private:

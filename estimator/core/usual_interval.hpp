@@ -1,6 +1,6 @@
 #pragma once
-// The usual time from one image to the next, learned from the stamps: the shortest of late. After a change of
-// the rate it follows within a few images; lost images do not make it longer for long.
+// The usual interval between images, learned from their stamps as the shortest recent one. It follows a
+// change of the rate within a few images; lost images increase it only for a short time.
 
 #include <algorithm>
 
@@ -10,7 +10,7 @@ namespace swiftlet {
 
 class UsualInterval {
  public:
-  /// At the lowest frame rate that can be set (1 Hz); the usual interval before any was seen.
+  /// Interval at the lowest frame rate that can be set (1 Hz); used before any interval was seen.
   static constexpr Duration kLongest = Duration::fromMilliseconds(1000);
 
   void add(Duration interval) { usual_ = std::min({interval, usual_ + usual_, kLongest}); }
