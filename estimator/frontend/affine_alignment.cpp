@@ -13,23 +13,24 @@ namespace {
 
 constexpr int kLanes = kPatchLanes;
 constexpr int kRows = kPatchSize;
-// Prior on each element of the step of A: grey noise 3 over 0.03, squared. It matters only where
-// texture leaves a direction of the affine part open.
+// Prior on each element of the step of A: grey noise 3 over 0.03, squared. It has an effect only where the
+// texture does not determine the affine part.
 constexpr float kAffinePrior = 1.0e4F;
-// Determinants outside mean that the template no longer describes what is seen.
+// With determinants outside this range the template no longer describes the image.
 constexpr float kMinDeterminant = 0.1F;
 constexpr float kMaxDeterminant = 10.0F;
-// Steps below this [px] end the iterations.
+// Iterations stop at steps below this [px].
 constexpr float kStop = 0.01F;
-// Greys are taken from the middle of their range, so that sums are small.
+// Grey values are taken relative to the middle of their range, so that sums are small.
 constexpr std::int16_t kMiddle = 128;
 
-// A disc: pixels in the corners of the square are the first to leave the surface that carries the
-// feature. On rendered flights the full square gives young tracks 5 % less error and old ones (80
-// frames) a third more outliers.
+// A disc, because pixels in the corners of the square are the first to leave the feature's surface. On
+// rendered flights the full square gives young tracks 5 % less error, but old ones (80 frames) a third more
+// outliers.
 const PatchWindow kWindow = makePatchWindow([](float x, float y) { return std::sqrt(x * x + y * y); });
 
-// Weights are in 1/8, greys less 128 too: all sums over the window then stay below 2^31 and are exact.
+// Weights are in 1/8 and grey values relative to 128 too, so all sums over the window stay below 2^31 and are
+// exact.
 constexpr int kWeightUnits = 8;
 constexpr int kGreyUnits = 8;
 
@@ -49,9 +50,9 @@ const struct alignas(32) IntegerWindow {
   std::array<std::int16_t, kLanes> column{};
 } kIntegerWindow;
 
-/// Of the template, weighted.
+/// Planes of the template, weighted.
 struct alignas(32) Pattern {
-  Plane value;  ///< grey less kMiddle
+  Plane value;  ///< grey minus kMiddle
   Plane x, y;   ///< doubled gradients
 };
 
@@ -60,7 +61,7 @@ void readTemplate(const ImageView& patch, int cx, int cy, Pattern& pattern) {
   const auto middle = Isa::broadcast(kMiddle);
   for (int r = 0; r < kRows; ++r) {
     const std::uint8_t* row = patch.row(cy - kPatchRadius + r) + (cx - kPatchRadius);
-    // Whole vectors: the columns beyond the window have weight zero.
+    // Complete vectors: columns beyond the window have weight zero.
     const int at = r * kLanes;
     const auto w = Isa::load(kIntegerWindow.weight.data() + at);
     const auto x = Isa::subtract(Isa::widen(row + 1), Isa::widen(row - 1));
@@ -71,7 +72,7 @@ void readTemplate(const ImageView& patch, int cx, int cy, Pattern& pattern) {
   }
 }
 
-// `image`: the window of the image, in kGreyUnits.
+// `image`: the image under the window, in kGreyUnits.
 template <typename Isa>
 AffineTemplate::Sums sumWindow(const Pattern& pattern, const Plane& image) {
   auto one = Isa::zero(), square = Isa::zero(), value = Isa::zero();
@@ -157,7 +158,7 @@ namespace {
 
 struct Light {
   float gain = 1;
-  float offset = 0;  ///< image less gain times template, both less kMiddle
+  float offset = 0;  ///< image minus gain times template, both minus kMiddle
   float correlation = 0;
 };
 
@@ -178,7 +179,7 @@ Light fitLight(const AffineTemplate::Sums& image, const AffineTemplate::Sums& pa
   return light;
 }
 
-// The window and the pixels that interpolate it lie in the image.
+// Whether the window and the pixels needed to interpolate it lie in the image.
 bool windowInside(const ImageView& image, const AffineTemplate::Estimate& e) {
   const Eigen::Vector2f half =
       e.warp.cwiseAbs() * Eigen::Vector2f::Constant(static_cast<float>(kPatchRadius));
@@ -187,7 +188,7 @@ bool windowInside(const ImageView& image, const AffineTemplate::Estimate& e) {
          e.position.y() + half.y() < static_cast<float>(image.height - 1);
 }
 
-// The image under the window, in kGreyUnits. False where its rows become too long.
+// Samples the image under the window, in kGreyUnits. False if its rows become too long.
 template <typename Isa>
 bool sampleWindow(const ImageView& image, const AffineTemplate::Estimate& e, Plane& plane) {
   if (!UprightSampler<Isa>().sample(image, e.position, e.warp, kPatchRadius, plane.data())) {
@@ -221,7 +222,7 @@ bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageVi
     const Light light = fitLight(sums, own_, constant_);
     estimate.correlation = light.correlation;
     if (!(light.gain > 0.1F)) return false;
-    // Of the residual: image less gain times template less offset.
+    // Moments of the residual: image minus gain times template minus offset.
     const Eigen::Matrix<float, 6, 1> moment =
         sums.moment - light.gain * own_.moment - light.offset * constant_.moment;
     const Eigen::Matrix<float, 6, 1> step = inverse_hessian_ * moment / light.gain;
@@ -233,7 +234,7 @@ bool AffineTemplate::align(const ImageView& patch, int cx, int cy, const ImageVi
     estimate.position -= estimate.warp * step.head<2>();
     const float size = estimate.warp.determinant();
     if (!(size > kMinDeterminant && size < kMaxDeterminant)) return false;
-    // The rim of the patch moves by the affine part times its radius.
+    // The edge of the patch moves by the affine part times its radius.
     const float rim = step.tail<4>().cwiseAbs().maxCoeff() * static_cast<float>(kPatchRadius);
     if (step.head<2>().squaredNorm() < kStop * kStop && rim < 3 * kStop) break;
   }

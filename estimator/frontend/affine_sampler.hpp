@@ -28,10 +28,10 @@ struct SamplerParts {
  protected:
   using Lanes = typename Isa::Int16x16;
 
-  static constexpr int kBits = 10;  // of a place behind the point
+  static constexpr int kBits = 10;  // fractional bits of a position
   static constexpr std::int16_t kFraction = (1 << kBits) - 1;
   static constexpr float kOne = 1 << kBits;
-  // Seven steps, the fractions of the half's first position and of the row's start (below 1 each) and the
+  // Seven steps, the fractions of the half's first position and of the row's start (each below 1) and the
   // neighbour fit into 16 columns.
   static constexpr float kLongestStep = 1.85F;
   static constexpr int kHalf = 8;
@@ -41,7 +41,7 @@ struct SamplerParts {
   /// Positions of the lanes along one axis of the image, each half relative to a whole pixel of its own.
   struct Axis {
     Axis(float step, int reach) {
-      constexpr int kFiner = 6;  // bits, so that the last place is rounded no worse than the others
+      constexpr int kFiner = 6;  // more bits, so that the last position is rounded as well as the others
       const int fine = rounded(step * kOne * (1 << kFiner));
       const auto at = [fine](int c) { return (c * fine + (1 << (kFiner - 1))) >> kFiner; };
       const int end = at(2 * reach);
@@ -181,7 +181,7 @@ class UprightSampler : SamplerParts<Isa> {
     const Eigen::Vector2f start = centre - warp * Eigen::Vector2f(r, r);
     const Axis axis(across, reach);
     const auto x_places = Isa::load(axis.place);
-    // y of the lanes relative to the window's corner, all from one whole pixel.
+    // y of the lanes relative to the window's corner, counted from one whole pixel.
     alignas(32) std::array<std::int16_t, kLanes> y{};
     const float lowest = std::min(0.0F, 2 * r * warp(1, 0));
     const int step_y = rounded(warp(1, 0) * kOne * 16);

@@ -9,7 +9,7 @@ namespace swiftlet {
 namespace {
 
 constexpr int kRefineIterations = 3;
-// A correction [px] beyond this says that tracker and patch disagree about what they see.
+// A larger correction [px] means that tracker and patch follow different things.
 constexpr float kMaxCorrection = 1.0F;
 // Correlation that a refined patch must reach.
 constexpr float kMinCorrelation = 0.85F;
@@ -26,7 +26,7 @@ void AnchorPatch::take(const Pyramid& image, const Eigen::Vector2f& pixel) {
     const int y = static_cast<int>(std::lround(at.y())) - side / 2;
     centre_[index] = at - Eigen::Vector2f(static_cast<float>(x), static_cast<float>(y));
     std::uint8_t* to = pixels_.data() + (level == 0 ? 0 : kSide0 * kSide0);
-    // The pyramid's border covers what lies outside the image: a feature is inside it.
+    // The feature is inside the image, so the pyramid's border covers pixels outside the image.
     for (int r = 0; r < side; ++r) {
       std::memcpy(to + r * side, source.row(y + r) + x, static_cast<std::size_t>(side));
     }

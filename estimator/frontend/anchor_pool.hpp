@@ -1,7 +1,7 @@
 #pragma once
-// The patches by which landmarks are recognized: their appearance in each camera at the first observation.
-// Tracked features hold a slot; lost ones keep theirs until the pool needs it, and the one not seen for
-// longest is dropped first. 1.9 KiB per patch, 3.8 MiB in all, reserved by the constructor.
+// Patches for recognizing landmarks: their appearance in each camera at the first observation. Each tracked
+// feature holds a slot. Lost ones keep theirs until the pool needs it; the one not seen for longest is
+// dropped first. 1.9 KiB per patch, 3.8 MiB in all, reserved by the constructor.
 
 #include <Eigen/Core>
 #include <array>
@@ -46,7 +46,7 @@ class AnchorPatch {
   AffineTemplate template_;
   bool has_template_ = false;
   std::array<Eigen::Vector2f, kLevels> centre_{};
-  /// Level 0, level 1, and the bytes after the last row that reading whole vectors needs.
+  /// Level 0, level 1, and the bytes after the last row that complete vectors read.
   std::array<std::uint8_t, kSide0 * kSide0 + kSide1 * kSide1 + 32> pixels_{};
 };
 

@@ -7,20 +7,20 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kMaskStep = 4;   // px: resolution of the minimum distance
+constexpr int kMaskStep = 4;   // px, resolution of the minimum distance
 constexpr int kBoxRadius = 3;  // px: 7x7 box
 constexpr int kBox = 2 * kBoxRadius + 1;
-constexpr int kImageBorder = 12;  // px: patches of new features lie inside the image
+constexpr int kImageBorder = 12;  // px; patches of new features must lie inside the image
 constexpr int kMinCell = 16;      // px
-// Sobel's 3x3 kernel gives 8 x the gradient.
+// Sobel's 3x3 kernel gives 8 times the gradient.
 constexpr float kScoreScale = 1.0F / (64.0F * kBox * kBox);
-// More cells than features: some are without texture.
+// More cells than features, because some have no texture.
 constexpr float kCellsPerFeature = 1.25F;
 
 constexpr int kLanes = 16;
 
-// Rolling sums over the last kBox rows of gradient products, one cell wide. Rows are written in whole vectors
-// and read kBox beyond them.
+// Rolling sums over the last kBox rows of gradient products, one cell wide. Rows are written in complete
+// vectors and read up to kBox beyond them.
 constexpr int kMaxRow = (CornerDetector::kMaxCell + 2 + 2 * kBoxRadius + kLanes - 1) / kLanes * kLanes;
 using ProductRow = std::array<float, kMaxRow>;
 struct Rolling {
@@ -29,8 +29,8 @@ struct Rolling {
   alignas(32) std::array<std::array<float, kMaxRow + kLanes>, 3> score;
 };
 
-// Takes a row of the image into the sums, and the one that it replaces out of them. Products of gradients are
-// integers below 2^20 and their sums below 2^23: exact in floats, so that nothing builds up.
+// Adds a row of the image to the sums and subtracts the row that it replaces. Products of gradients are
+// integers below 2^20 and their sums below 2^23: exact in floats, so errors do not accumulate.
 template <typename Isa>
 void addRow(const std::uint8_t* row, int stride, int width, std::size_t slot, Rolling& r) {
   const auto take = [](float* sum, float* product, const auto& a, const auto& b) {
@@ -57,7 +57,7 @@ void addRow(const std::uint8_t* row, int stride, int width, std::size_t slot, Ro
   }
 }
 
-// Whether any score is above `limit`: of the vectors that hold the row.
+// Computes a row of scores in complete vectors; returns whether any is above `limit`.
 template <typename Isa>
 bool scoreRow(const Rolling& r, int width, float limit, float* score) {
   bool above = false;
@@ -124,7 +124,7 @@ Corner CornerDetector::bestOfCell(const ImageView& image, int x0, int y0, int x1
   best.score = min_score;
   const int first = y0 - 1 - kBoxRadius;
   const int last = y1 + kBoxRadius;
-  bool here_above = false;  // the limit, in the row of scores before the newest
+  bool here_above = false;  // whether the row of scores before the newest has one above the limit
   for (int y = first; y <= last; ++y) {
     const int count = y - first;
     addRow<Isa>(image.row(y) + (x0 - 1 - kBoxRadius), image.stride, product_width,
@@ -187,7 +187,7 @@ void CornerDetector::detect(const ImageView& image, const Pixels& occupied, int 
     top = std::max(top, best.score);
     if (!candidates_.tryPushBack(best)) break;
   }
-  // Total order (score, then place): the result does not depend on the sort's implementation.
+  // Total order (score, then position), so the result does not depend on the implementation of sort.
   std::sort(candidates_.begin(), candidates_.end(), [](const Corner& a, const Corner& b) {
     if (a.score != b.score) return a.score > b.score;
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();

@@ -6,7 +6,7 @@
 // that need a point are evaluated. A corner must be the maximum of its 3x3 neighbourhood, above an
 // absolute and a relative threshold, and have a minimum distance from every other feature.
 //
-// Corners are at whole pixels, because the template around a feature is then read without interpolation
+// Corners are at whole pixels: the template around a feature is then read without interpolation
 // (patch_template.hpp), and any point of the patch can represent the feature.
 //
 // Memory is reserved by the constructor; cost about 3 ns per evaluated pixel.
@@ -37,12 +37,12 @@ class CornerDetector {
  public:
   CornerDetector(int width, int height);
 
-  /// px: kMaxCells of these cover 67 megapixels.
+  /// px; kMaxCells of this size cover 67 megapixels.
   static constexpr int kMaxCell = 256;
 
   /// Corners in empty cells, best first, at most `wanted`. `image` must have the border of a Pyramid level.
-  /// `occupied`: existing features. `features_at_most`: number of features for the whole image, which sets
-  /// the cell size.
+  /// `occupied`: existing features. `features_at_most`: largest number of features in the whole image, which
+  /// determines the cell size.
   using Pixels = FixedVector<Eigen::Vector2f, kMaxFeatures>;
   template <typename Isa = simd::Native>
   void detect(const ImageView& image, const Pixels& occupied, int features_at_most, int wanted,

@@ -8,20 +8,21 @@
 namespace swiftlet {
 namespace {
 
-// Features of a camera whose image is missing are held this long, or longer if a slow camera loses one image
-// and the next comes late by half an interval. At 1 rad/s and 450 px the view moves by a fifth of the image
-// in 250 ms. Features that left the view are lost one by one; the limit only saves searches of a view that
+// Features of a camera whose image is missing are held this long. Slow cameras need more: one lost image, and
+// the next one late by half an interval. At 1 rad/s and 450 px the view moves by a fifth of the image in 250
+// ms. Features that left the view are lost one by one anyway; the limit only saves searches in a view that
 // has changed.
 constexpr Duration kMinHold = Duration::fromMilliseconds(250);
 constexpr double kHeldIntervals = 2.5;
-// Sigmas of the estimated extrinsics by which stereo matches may miss the epipolar curve.
+// Error of the estimated extrinsics, in sigmas, that is allowed in the distance of stereo matches from the
+// epipolar curve.
 constexpr double kExtrinsicSigmas = 3.0;
-// Below this share of the wanted features new ones are detected without waiting for a keyframe.
+// Below this share of the wanted features, new ones are detected without waiting for a keyframe.
 constexpr float kReplenishShare = 0.6F;
-// A feature that the other camera does not show is looked for again at the next keyframe, then after one more
-// in between each time, up to this many: most are out of its sight and stay so.
+// If a feature is not found in the other camera, the next attempt is at the next keyframe, and after each
+// further failure one keyframe later, up to this many: most such features are out of the other camera's view.
 constexpr int kMaxMatchWait = 3;
-// An image is dark when its mean is below this level and it carries almost no feature.
+// An image is dark if its mean is below this level and it has almost no features.
 constexpr float kDarkMean = 12.0F;
 constexpr int kDarkFeatures = 10;
 
@@ -79,7 +80,7 @@ void Frontend::Impl::takeImages(const StereoFrame& frame, const FrontendPredicti
   for (std::size_t c = 0; c < rig_.camera_count; ++c) {
     Camera& camera = camera_[c];
     const bool was_present = camera.present;
-    // Rotation since this camera's newest image: fresh when that was the previous frame's.
+    // Rotation since this camera's newest image: starts anew if that was in the previous frame.
     if (was_present) {
       camera.R_prev_cur.setIdentity();
       camera.rotation_known = true;
@@ -142,7 +143,7 @@ void Frontend::Impl::darkImages() {
     int features = 0;
     for (const Track& track : tracks_) features += track.live[c] ? 1 : 0;
     if (features >= kDarkFeatures) continue;
-    // The coarsest level is a small mean image.
+    // The coarsest level serves as a small mean image.
     const Pyramid& pyramid = camera_[c].now();
     const ImageView& small = pyramid.level(pyramid.levels() - 1);
     std::int64_t sum = 0;

@@ -45,14 +45,14 @@ struct FrontendStatistics {
 };
 
 enum class SightingLoss : std::uint8_t {
-  kNotFound,  ///< by Lucas-Kanade and its checks
+  kNotFound,  ///< lost by Lucas-Kanade or its checks
   kMotion,    ///< contradicts the camera's motion
   kStereo,    ///< contradicts the other camera
 };
 
-/// A sighting that the last step gave up.
+/// An observation that was lost in the last step.
 struct LostSighting {
-  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< where not found: in the image before
+  Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< for kNotFound: in the previous image
   std::uint8_t camera = 0;
   SightingLoss loss = SightingLoss::kNotFound;
 };
@@ -70,7 +70,7 @@ class Frontend {
               TrackedFrame& out);
 
   [[nodiscard]] const FrontendStatistics& statistics() const;
-  /// Of the last step.
+  /// Observations lost in the last step.
   [[nodiscard]] const LostSightings& lost() const;
 
   /// Forgets all tracks and patches; ids continue.

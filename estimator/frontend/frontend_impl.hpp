@@ -27,12 +27,12 @@ struct Track {
   int unmatched = 0;   ///< consecutive failed attempts to find it in the other camera
   int match_wait = 0;  ///< keyframes until the next attempt
   int landmark = -1;   ///< index of its prediction in this frame's list
-  /// Has a position in that camera's newest image, which may be of an earlier frame.
+  /// Whether it has a position in that camera's newest image, which may be of an earlier frame.
   std::array<bool, kMaxCameras> live{};
-  std::array<bool, kMaxCameras> had_previous{};  ///< `previous_bearing` is of the frame before
+  std::array<bool, kMaxCameras> had_previous{};  ///< whether `previous_bearing` is of the previous frame
   std::array<Eigen::Vector2f, kMaxCameras> pixel{};
   std::array<Eigen::Vector3d, kMaxCameras> bearing{};
-  /// As seen from the middle row of a rolling shutter, for a point at infinity.
+  /// For a rolling shutter, as seen from the middle row for a point at infinity.
   std::array<Eigen::Vector3d, kMaxCameras> previous_bearing{};
   std::array<bool, kMaxCameras> in_keyframe{};
   std::array<Eigen::Vector3d, kMaxCameras> keyframe_bearing{};

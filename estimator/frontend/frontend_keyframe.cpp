@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-// Fewer values than this make no median.
+// Smallest number of values for a median.
 constexpr std::size_t kMinForMedian = 5;
 
 template <std::size_t kCapacity>
@@ -28,7 +28,7 @@ float Frontend::Impl::medianParallax() const {
     const std::size_t c = track.live[0] && track.in_keyframe[0] ? 0 : 1;
     if (!track.live[c] || !track.in_keyframe[c]) continue;
     const Eigen::Quaterniond& q = rig_.T_body_cam[c].rotation;
-    // Bearing at the keyframe as it would be seen now without translation.
+    // The keyframe's bearing as seen now without translation.
     const Eigen::Vector3d expected = q.conjugate() * (rotation.conjugate() * (q * track.keyframe_bearing[c]));
     const double angle = std::atan2(expected.cross(track.bearing[c]).norm(), expected.dot(track.bearing[c]));
     parallax.pushBack(static_cast<float>(angle * rig_.camera[c].focal()));

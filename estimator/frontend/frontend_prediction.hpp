@@ -27,7 +27,8 @@ struct FrontendPrediction {
   /// Motion during this frame's rows, for a rolling shutter.
   ScanTurn scan;
   FixedVector<PredictedLandmark, kMaxLandmarks> landmarks;
-  /// If extrinsics are estimated: their present values, and the sigma of one camera relative to the other.
+  /// Present if extrinsics are estimated: their current values, and the sigma of one camera relative to the
+  /// other.
   bool has_extrinsics = false;
   std::array<SE3, kMaxCameras> T_body_cam;
   double stereo_rotation_sigma = 0;  ///< rad

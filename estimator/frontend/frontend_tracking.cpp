@@ -1,4 +1,4 @@
-// Frontend::Impl: following features from frame to frame, verifying them, finding lost ones.
+// Frontend::Impl: tracks features from frame to frame, verifies them, and finds lost ones.
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -10,26 +10,26 @@
 namespace swiftlet {
 namespace {
 
-// With a predicted landmark the error is a few pixels: two levels reach 12 px.
+// With a predicted landmark the error is a few pixels: two levels cover 12 px.
 constexpr int kLevelsWithLandmark = 2;
-// With rotation removed what remains is parallax, at most some 20 px between frames.
+// With rotation removed only parallax remains, at most about 20 px between frames.
 constexpr int kLevelsWithRotation = 3;
 constexpr int kBackLevels = 2;
-// After so many frames in a row without agreement the patch is taken anew: the view has changed.
+// After this many consecutive frames without agreement the patch is replaced: the view has changed.
 constexpr int kMaxRefineFailures = 3;
-// Fewer tracks than this do not carry a RANSAC.
+// Fewer tracks than this are not enough for RANSAC.
 constexpr std::size_t kMinTracksToVerify = 12;
-// Pixel noise behind the gates: they stand at 3 sigma.
+// The gates are at 3 sigma of the pixel noise.
 constexpr double kGateSigmas = 3.0;
-// Correlation by which a landmark found by projection must resemble its patch.
+// Smallest correlation with its patch for a landmark found by projection.
 constexpr float kMinRecognition = 0.8F;
-// Sightings looked for in one frame at most, at about 1.5 us each: bounds the time.
+// Limits the time: searches per frame, at about 1.5 us each.
 constexpr int kMaxSearches = 240;
 
 }  // namespace
 
 void Frontend::Impl::lose(const Track& track, std::size_t c, SightingLoss loss) {
-  // Room for every sighting: a track loses each of its own once in a step.
+  // There is room for all: each observation is lost at most once per step.
   lost_.pushBack({track.pixel[c], static_cast<std::uint8_t>(c), loss});
 }
 
@@ -82,7 +82,8 @@ bool Frontend::Impl::follow(const Track& track, std::size_t c, const Guess& gues
     ++statistics_.refined;
     return true;
   };
-  // Mostly a landmark is within a pixel of where it was predicted: the first sighting then decides alone.
+  // A landmark is mostly within a pixel of its prediction: then alignment with its first observation
+  // suffices.
   pixel = guess.pixel;
   if (guess.of_landmark && patch.failures == 0 && patchInside(image, pixel) && refine() &&
       patchInside(image, pixel)) {
@@ -94,7 +95,7 @@ bool Frontend::Impl::follow(const Track& track, std::size_t c, const Guess& gues
   pixel = guess.pixel;
   if (!trackPoint(camera.before(), track.pixel[c], camera.now(), settings, pixel)) return false;
   const Eigen::Vector2f tracked = pixel;
-  // What agrees with its first sighting needs no way back.
+  // No backward check is needed if the result agrees with the first observation.
   if (refine()) return true;
   settings.back_check = settings_.back_check;
   settings.back_levels = kBackLevels;
@@ -169,7 +170,7 @@ void Frontend::Impl::verifyMotion(std::size_t c, std::uint64_t seed) {
       camera_[c].rotation_known
           ? ransac_.twoPoint(prev, cur, camera_[c].R_prev_cur.conjugate(), seed, ransac_result_)
           : ransac_.fivePoint(prev, cur, seed, ransac_result_);
-  // Without a consensus, or with one of a minority, nothing is known about single tracks.
+  // Without a consensus of the majority nothing can be said about single tracks.
   const bool usable =
       (status.ok() || ransac_result_.no_parallax) && 2 * ransac_result_.inlier_count > owners_.size();
   if (!usable) return;
@@ -216,7 +217,7 @@ bool Frontend::Impl::locate(AnchorPatch& anchor, std::size_t c, const PredictedL
     if (!found && level == 0) return false;
   }
   const ImageView& image = camera_[c].now().level(0);
-  // The warp is as old as the last sighting: bring it up to date, and the position with it.
+  // The warp is as old as the last observation: update it together with the position.
   if (pattern.correlation(image, pixel) < kMinRecognition ||
       !anchor.refine(image, Eigen::Matrix2f::Identity(), pixel)) {
     return false;

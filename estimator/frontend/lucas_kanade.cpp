@@ -5,10 +5,10 @@
 namespace swiftlet {
 namespace {
 
-// The patch, its gradient pixel and the interpolation's neighbour.
+// The patch, one more pixel for gradients, and one for interpolation.
 constexpr float kBorder = static_cast<float>(kPatchRadius) + 2.0F;
 
-// `finish`: of level 0.
+// `finish` applies to level 0.
 bool trackForward(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to, int levels,
                   const AlignmentLimits& limits, PatchTemplate::Finish finish, Eigen::Vector2f& to_pixel) {
   PatchTemplate patch;
@@ -56,7 +56,7 @@ bool trackPoint(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Py
 bool tracksBack(const Pyramid& from, const Eigen::Vector2f& from_pixel, const Pyramid& to,
                 const LucasKanadeSettings& settings, const Eigen::Vector2f& to_pixel) {
   Eigen::Vector2f back = from_pixel;
-  // What the finish adds is far below what is allowed.
+  // The fine finish changes less than the tolerance, so it is not needed here.
   if (!trackForward(to, to_pixel, from, settings.back_levels, settings.limits, PatchTemplate::Finish::kCoarse,
                     back)) {
     return false;

@@ -12,29 +12,29 @@ constexpr int kLanes = kPatchLanes;
 // Weights in 1/16: the integer gradients are then 16 w (doubled difference), at most 4080, and all
 // sums over the window stay below 2^31.
 constexpr float kWeightScale = 16.0F;
-// Below this smaller eigenvalue [grey^2 / px^2] (per unit weight) sensor noise decides the position.
+// Below this smaller eigenvalue [grey^2 / px^2] (per unit weight) the position is dominated by sensor noise.
 constexpr float kMinEigenvalue = 1.0F;
-// A template whose variance is below this [grey^2] has no gain to estimate.
+// Below this variance [grey^2] the template does not determine a gain.
 constexpr float kMinVariance = 1.0F;
-// How far outside the image the patch centre may wander while it is being aligned [px].
+// How far outside the image the patch centre may be during alignment [px].
 constexpr float kOutside = 4.0F;
-// Steps inside one cell; they cost a few operations each.
+// Steps within one cell; each costs only a few operations.
 constexpr int kStepsPerCell = 6;
-// A position this far beyond its cell is still extrapolated rather than given a new cell.
+// A position this far beyond its cell is extrapolated; farther ones need a new cell.
 constexpr float kCellSlack = 0.05F;
 
-// The brightness counts as unchanged while the mean's difference, as a multiple of its standard
-// deviation and squared, is below this (chi-square of one degree of freedom: 0.1 % are above by chance).
+// The brightness counts as unchanged if the squared difference of the means, relative to its variance, is
+// below this (chi-square with one degree of freedom: exceeded by chance in 0.1 %).
 constexpr float kMaxUnchanged = 10.8F;
 // Parameters of the alignment: position, gain, offset.
 constexpr float kParameters = 4.0F;
-// Variance of the difference of two images rounded to whole greys [grey^2].
+// Variance of the difference of two images rounded to integers [grey^2].
 constexpr float kRounding = 1.0F / 6.0F;
 
-// Between a square and a disc, |x|^3 + |y|^3: pixels in the corners are the first to leave the
-// surface that carries the feature, yet on an even surface they count like all others. On image
-// pairs a disc errs by 2 to 3 % more under shifts, a square by 2 % more under warps; with an
-// exponent of 4 the map of a rendered flight with near walls errs by a quarter more.
+// A shape between square and disc, |x|^3 + |y|^3: pixels in the corners are the first to leave the feature's
+// surface, but on a plane surface they are as useful as others. On image pairs a disc has 2 to 3 % more error
+// under shifts and a square 2 % more under warps; with an exponent of 4 the map of a rendered flight with
+// near walls has a quarter more error.
 const PatchWindow kWindow =
     makePatchWindow([](float x, float y) { return std::cbrt(x * x * x + y * y * y); });
 
@@ -71,8 +71,8 @@ bool PatchTemplate::build(const std::uint8_t* centre, int stride) {
   auto xx = Isa::zero(), xy = Isa::zero(), yy = Isa::zero(), xt = Isa::zero(), yt = Isa::zero();
   const auto one = Isa::broadcast(1);
   const auto grey = Isa::broadcast(128);
-  // Scharr's smoothing (3 10 3)/16 across each derivative: the finest detail, which bilinear
-  // interpolation falsifies, weighs less.
+  // Scharr's smoothing (3 10 3)/16 across each derivative gives less weight to the finest detail, which
+  // bilinear interpolation distorts.
   const auto three = Isa::broadcast(3);
   const auto ten = Isa::broadcast(10);
   const auto sixteenth = Isa::broadcast(2048);
@@ -142,10 +142,10 @@ bool PatchTemplate::factor(const Eigen::Matrix2f& products, const Eigen::Vector2
                            const Eigen::Vector2f& level) {
   slope_ = slope;
   level_ = level;
-  // Covariances with T and 1 removed: the Schur complement of gain and offset.
+  // Covariances without the components along T and 1: the Schur complement of gain and offset.
   const Eigen::Matrix2f reduced =
       products - variance_ * slope * slope.transpose() - level * level.transpose();
-  // The factor 1/4 takes the doubled differences to gradients.
+  // The factor 1/4 converts doubled differences to gradients.
   const float a = 0.25F * reduced(0, 0);
   const float b = 0.25F * reduced(0, 1);
   const float c = 0.25F * reduced(1, 1);
@@ -191,7 +191,7 @@ void PatchTemplate::visit(const ImageView& image, Cell& cell) const {
 // Means over the window of the difference I - T times 2G, T - mean and 1.
 Eigen::Vector4f PatchTemplate::projection(const Sums& sums) const {
   Eigen::Vector4f e;
-  // Differences of integers are exact; those of their floats would not be.
+  // Subtract integers, which is exact, before converting to float.
   for (std::size_t i = 0; i < 4; ++i) {
     e[static_cast<Eigen::Index>(i)] = static_cast<float>(sums[i] - own_[i]) / kIntegerWindow.total;
   }
@@ -205,7 +205,7 @@ Eigen::Vector2f PatchTemplate::step(const Eigen::Vector4f& e, Light light) const
 }
 
 bool PatchTemplate::iterate(const Cell& cell, Light light, float stop, Eigen::Vector2f& position) const {
-  // Steps at the cell's four corners; the step at (u, v) is their bilinear mix.
+  // Steps at the cell's four corners; the step at (u, v) is their bilinear interpolation.
   std::array<Eigen::Vector2f, 4> d;
   for (std::size_t i = 0; i < 4; ++i) d[i] = step(projection(cell.sums[i]) + cell.correction, light);
   Eigen::Vector2f f = position - cell.base;
@@ -319,7 +319,7 @@ PatchTemplate::Light PatchTemplate::correct(const ImageView& image, const Eigen:
   const Eigen::Vector4f top = corner[0] + f.x() * (corner[1] - corner[0]);
   const Eigen::Vector4f bottom = corner[2] + f.x() * (corner[3] - corner[2]);
   cell.correction = e - (top + f.y() * (bottom - top));
-  // e[3] is the offset, its variance that of the noise over pixels and level_share_.
+  // e[3] is the offset; its variance is that of the noise divided by pixels and level_share_.
   const float unexplained =
       std::max(sumOf(squares) / pixels - e[2] * e[2] / variance_ - e[3] * e[3], kRounding);
   const float evidence = e[3] * e[3] * level_share_ * (pixels - kParameters) / unexplained;

@@ -14,14 +14,12 @@
 //
 // Two corrections are made at the finest level (`Finish::kFine`).
 //  - Estimating gain and offset costs accuracy: under constant light the median error is 24 to 30 % larger
-//  than
-//    without. If the offset is within noise, the position is therefore computed again with g = o = 0. The
-//    offset decides, because a change of light changes both, while noise in the template, interpolation and
-//    blur only lower the gain.
+//    than without. If the offset is within noise, the position is therefore computed again with g = o = 0.
+//    Only the offset decides, because a change of light changes both, while noise in the template,
+//    interpolation and blur only lower the gain.
 //  - Bilinear interpolation displaces fine detail by up to 0.02 px. Its error is measured once, at the
-//  position
-//    found, as the difference from cubic convolution (Keys, "Cubic Convolution Interpolation for Digital
-//    Image Processing", 1981), and subtracted from the sums.
+//    position found, as the difference from cubic convolution (Keys, "Cubic Convolution Interpolation for
+//    Digital Image Processing", 1981), and subtracted from the sums.
 //
 // The template is centred on a whole pixel, so that it is read without interpolation; the caller keeps the
 // sub-pixel offset of the feature. Cost of a track: lucas_kanade.hpp.
@@ -45,7 +43,7 @@ struct AlignmentLimits {
 
 class PatchTemplate {
  public:
-  /// Whether the position is final or the initial guess of a finer level.
+  /// kFine: the position is final; kCoarse: it is the initial guess for a finer level.
   enum class Finish { kCoarse, kFine };
 
   /// `centre` points to the template's central pixel; uses kPatchRadius + 1 pixels around it and reads rows

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kMinSide = 16;
 constexpr int kRowAlignment = 64;  // bytes: a row starts on a cache line
-constexpr int kFilterReach = 2;    // pixels on either side of the 5 taps
+constexpr int kFilterReach = 2;    // pixels of the 5 taps on either side
 constexpr int kLanes = 16;
 
 int alignedStride(int width) {
@@ -33,7 +33,7 @@ Pyramid::Pyramid(int width, int height, int levels) {
     h = (h + 1) / 2;
   }
   storage_.assign(total, 0);
-  // Two halves of whole vectors, and what reading shifted vectors takes behind them.
+  // Two halves of complete vectors, and room for reading shifted vectors.
   row_.assign(static_cast<std::size_t>(width + 2 * kRowAlignment), 0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(levels_); ++k) {
     view_[k].data = storage_.data() + origin_[k];
@@ -64,7 +64,7 @@ template <typename Isa>
 void Pyramid::halve(int from) {
   const ImageView& fine = view_[static_cast<std::size_t>(from)];
   const ImageView& coarse = view_[static_cast<std::size_t>(from) + 1];
-  // One row filtered along y, its even and odd pixels apart: at most 16 * 255.
+  // One row filtered along y, with even and odd pixels separated; values up to 16 * 255.
   std::int16_t* const even = row_.data();
   std::int16_t* const odd = even + row_.size() / 2;
   const auto six = Isa::broadcast(6);
@@ -85,7 +85,7 @@ void Pyramid::halve(int from) {
       Isa::store(odd + x, Isa::odd(a, b));
     }
     std::uint8_t* out = writableRow(from + 1, y);
-    // Whole vectors: what runs into the border is overwritten with it.
+    // Complete vectors: values written into the border are overwritten later.
     for (int x = 0; x < coarse.width; x += kLanes) {
       const auto ends = Isa::add(Isa::load(even + x), Isa::load(even + x + 2));
       const auto sides = Isa::template shiftLeft<2>(Isa::add(Isa::load(odd + x), Isa::load(odd + x + 1)));

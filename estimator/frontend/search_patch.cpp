@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kPixels = SearchPatch::kSide * SearchPatch::kSide;
 constexpr int kLanes = 16;
-// Variance [grey^2] below which a patch says nothing.
+// Below this variance [grey^2] a patch is too flat to match.
 constexpr float kMinVariance = 4.0F;
 
 constexpr std::array<std::int16_t, kLanes> makeOnes() {

@@ -15,16 +15,17 @@ namespace {
 constexpr int kSearchLevel = 1;
 constexpr int kMaxSamples = 256;
 constexpr int kMaxStrips = 10;  // on each side of the curve
-// Below this a sampled place is not worth refining: the warp at infinity and whole-pixel sampling
-// cost some correlation, so it is lower than the final threshold.
+// Samples below this are not refined. It is lower than the final threshold, because the approximate warp and
+// whole-pixel sampling cost some correlation.
 constexpr float kMinSearchCorrelation = 0.6F;
-// Samples nearer than this to the best one belong to its own peak [samples].
+// Samples closer than this to the best one belong to its peak [samples].
 constexpr int kPeakWidth = 3;
-// A rival this close in correlation to the best is refined as well, and must then stay behind by
-// the second margin.
+// A rival whose correlation is within the first margin of the best is refined as well, and must then be worse
+// by the second margin.
 constexpr float kRivalMargin = 0.1F;
 constexpr float kAmbiguity = 0.04F;
-// Matches this far beyond infinity are noise of distant points [px of disparity].
+// Matches with a more negative disparity than this are rejected; smaller values are noise of distant points
+// [px].
 constexpr double kBeyondInfinity = 0.7;
 
 }  // namespace
@@ -47,7 +48,7 @@ double StereoMatcher::epipolarDistance(const Eigen::Vector3d& bearing0,
                                        const Eigen::Vector3d& bearing1) const {
   const Eigen::Vector3d normal = (rotation_[0] * bearing0).cross(translation_[0]);
   const double norm = normal.norm();
-  // On the baseline itself every direction is in plane.
+  // On the baseline itself the bearing lies in every epipolar plane.
   if (!(norm > 1e-9)) return 0;
   return std::abs(bearing1.dot(normal)) / norm * rig_.camera[1].focal();
 }
@@ -82,17 +83,17 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
   Eigen::Matrix2f warp;
   WarpedPatch patch;
   SearchPatch pattern;
-  // The warp of a middling distance serves the search: between 0.5 m and infinity it changes little.
+  // One warp, for a medium distance, serves the whole search: it changes little between 0.5 m and infinity.
   if (!warpAt(from, bearing, 0.1 * nearest, warp) || !(std::abs(warp.determinant()) > 0.05F)) return found;
   if (!patch.sample(from_image.level(level), from_pixel / scale, warp.inverse(), kPyramidBorder / 2))
     return found;
   if (!pattern.build(patch.centre(), patch.stride())) return found;
 
-  // Length of the curve: by its ends where both project, else the most a sample list can hold.
+  // Length of the curve: from its ends if both project, else the largest number of samples.
   Eigen::Vector2d far_end;
   Eigen::Vector2d near_end;
   int samples = kMaxSamples;
-  int strips = 0;  // beside the curve, on each side
+  int strips = 0;  // parallel to the curve, on each side
   Eigen::Vector2f step = Eigen::Vector2f::Zero();
   if (target.project(rotated + farthest * translation, far_end) &&
       target.project(rotated + nearest * translation, near_end)) {
@@ -132,7 +133,7 @@ StereoMatcher::Candidates StereoMatcher::search(const Pyramid& from_image, std::
   return found;
 }
 
-// Another strip's; what lies beside the best one is part of its peak.
+// Merges the candidates of another strip. Those near the best one belong to its peak.
 void StereoMatcher::Candidates::add(const Candidate& other_best, const Candidate& other_rival, float peak) {
   Candidate second = other_best;
   if (other_best.correlation > best.correlation) std::swap(best, second);
@@ -158,7 +159,7 @@ bool StereoMatcher::refine(const Pyramid& from_image, std::size_t from, const Ei
   if (!rig_.camera[1 - from].unproject(candidate.pixel.cast<double>(), other)) return false;
   const double distance = from == 0 ? epipolarDistance(bearing, other) : epipolarDistance(other, bearing);
   if (distance > static_cast<double>(gate())) return false;
-  // Disparity towards the epipole direction: the component of the match beyond infinity.
+  // Disparity towards the epipole: the displacement from the point at infinity.
   const Eigen::Vector3d at_infinity = rotation_[from] * bearing;
   const Eigen::Vector3d& translation = translation_[from];
   const Eigen::Vector3d along = translation - at_infinity * at_infinity.dot(translation);

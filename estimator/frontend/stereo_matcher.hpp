@@ -30,8 +30,8 @@ class StereoMatcher {
  public:
   StereoMatcher(const Rig& rig, const StereoMatcherSettings& settings);
 
-  /// Sets estimated extrinsics, and by how much a match may exceed the gate [px] because of their
-  /// uncertainty. A larger value makes the search slower.
+  /// Sets estimated extrinsics, and how far a match may exceed the gate [px] because of their uncertainty. A
+  /// larger value makes the search slower.
   void setExtrinsics(const std::array<SE3, kMaxCameras>& T_body_cam, float slack);
 
   /// Pixel in camera `from` to pixel in the other camera. False if there is no unambiguous match.

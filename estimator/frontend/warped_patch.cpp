@@ -51,7 +51,7 @@ bool alignWarped(const Pyramid& from, const Eigen::Vector2f& from_pixel, const E
   const Eigen::Matrix2f inverse = warp.inverse();
   WarpedPatch patch;
   PatchTemplate pattern;
-  // Half the border stays for the samples' neighbours.
+  // Half of the border remains for the samples' neighbours.
   constexpr int kBorder = kPyramidBorder / 2;
   for (int level = levels - 1; level >= 0; --level) {
     const auto scale = static_cast<float>(1 << level);
