@@ -7,8 +7,8 @@
 namespace swiftlet {
 namespace {
 
-// The second singular value of the cross-covariance below this share of the first: the points lie
-// on a line to rounding, and the rotation about it is open.
+// If the second singular value of the cross-covariance is below this share of the first, the points lie on a
+// line within rounding and the rotation about it is undetermined.
 constexpr double kMinSpreadRatio = 1e-12;
 
 struct Moments {

@@ -1,10 +1,10 @@
 #pragma once
 // Best transform from one point set to another in the least-squares sense.
 //
-// `to[i] ~ s R from[i] + t`. Sources: Umeyama, PAMI 1991 (rotation, translation, scale; Arun et al.,
-// PAMI 1987 without scale); rotation about z alone in closed form (Zhang, Scaramuzza, IROS 2018,
-// section III-C: the four unobservable directions of a visual-inertial estimate).
-// Double precision on centred points; no allocation; O(n), two passes.
+// `to[i] ~ s R from[i] + t`. Sources: Umeyama, PAMI 1991 (rotation, translation, scale; Arun et al., PAMI
+// 1987 without scale); rotation about z alone in closed form (Zhang, Scaramuzza, IROS 2018, section III-C:
+// the four unobservable directions of a visual-inertial estimate). Double precision on centred points; no
+// allocation; O(n), two passes.
 
 #include <Eigen/Core>
 #include <span>

@@ -33,7 +33,7 @@ constexpr std::array<std::array<std::size_t, 4>, 10> kQuadraticTimesLinear = {{{
                                                                                {11, 14, 17, 18},
                                                                                {12, 15, 18, 19}}};
 constexpr std::size_t kEliminated = 10;
-// A pivot below this share of the row's scale: the five points do not determine the motion.
+// With a pivot below this share of the row's scale, the five points do not determine the motion.
 constexpr double kMinPivot = 1e-12;
 
 void addProduct(const Linear& a, const Linear& b, double factor, Quadratic& sum) {
@@ -98,7 +98,7 @@ bool eliminate(Constraints& rows) {
     const double inverse = 1.0 / rows[column][column];
     for (std::size_t m = column; m < 20; ++m) rows[column][m] *= inverse;
     for (std::size_t i = 0; i < kEliminated; ++i) {
-      // Rows 0 to 3 (x3 y3 x2y xy2) are not used below: they need not be cleared.
+      // Rows 0 to 3 (x3 y3 x2y xy2) are not used below and need not be cleared.
       if (i == column || i < std::min<std::size_t>(column, 4)) continue;
       const double factor = rows[i][column];
       for (std::size_t m = column; m < 20; ++m) rows[i][m] -= factor * rows[column][m];

@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-// Two epipolar planes closer than this [rad], or a parallax below it, give no direction.
+// If the angle between two epipolar planes [rad] or a parallax is below this, the direction is undetermined.
 constexpr double kMinSine = 1e-9;
 
 // Right-handed axes: the first bearing, the normal of both, and their cross product.
@@ -56,7 +56,7 @@ Eigen::Vector3d translationFromTwoPoints(const Eigen::Matrix3d& R, std::span<con
   const Eigen::Vector3d t = normal0.cross(normal1);
   const double norm = t.norm();
   if (!(norm > kMinSine * normal0.norm() * normal1.norm()) || !(norm > 0)) return Eigen::Vector3d::Zero();
-  // In front, the current bearing lies between the turned one and t: it moved towards t.
+  // For points in front, the current bearing lies between the rotated one and t: it moved towards t.
   const double towards = (cur[0] - turned0).dot(t) + (cur[1] - turned1).dot(t);
   return towards < 0 ? Eigen::Vector3d(-t / norm) : Eigen::Vector3d(t / norm);
 }

@@ -1,8 +1,8 @@
 #pragma once
-// Motion from the fewest correspondences, on unit bearings (any lens, any angle).
+// Motion from the fewest correspondences of unit bearings (any lens, any angle).
 //
-// Bearings and points of the previous and the current camera frame: p_cur = R p_prev + t, and
-// E = hat(t) R, so that cur^T E prev = 0.
+// For bearings and points of the previous and the current camera frame: p_cur = R p_prev + t, and E = hat(t)
+// R, so that cur^T E prev = 0.
 
 #include <Eigen/Core>
 #include <array>
@@ -15,9 +15,8 @@ namespace swiftlet {
 inline constexpr std::size_t kMaxEssentials = 10;
 
 /// Essential matrices through five correspondences, each of Frobenius norm sqrt(2); none if the five are
-/// numerically degenerate. Nister, "An efficient solution to the five-point relative
-/// pose problem", PAMI 2004: null space, ten cubics, elimination, a polynomial of degree ten.
-/// No allocation; about 6 us.
+/// numerically degenerate. Nister, "An efficient solution to the five-point relative pose problem", PAMI
+/// 2004: null space, ten cubics, elimination, a polynomial of degree ten. No allocation; about 6 us.
 FixedVector<Eigen::Matrix3d, kMaxEssentials> essentialFromFivePoints(std::span<const Eigen::Vector3d, 5> prev,
                                                                      std::span<const Eigen::Vector3d, 5> cur);
 
@@ -30,8 +29,8 @@ struct EssentialMotions {
 /// orientation from essential matrix", 1990: by cofactors, without a decomposition.
 EssentialMotions motionsOfEssential(const Eigen::Matrix3d& E);
 
-/// Rotation that takes two bearings to two others without translation: exact for the first and for the plane
-/// of both. Not finite if the two bearings coincide.
+/// Rotation that maps two bearings to two others, without translation: exact for the first bearing and for
+/// the plane of both. Not finite if the two bearings coincide.
 Eigen::Matrix3d rotationFromTwoPoints(std::span<const Eigen::Vector3d, 2> prev,
                                       std::span<const Eigen::Vector3d, 2> cur);
 

@@ -13,21 +13,21 @@
 namespace swiftlet {
 namespace {
 
-// 3 sigma of a normal error in one direction, and the same probability in two directions.
+// 3 sigma of a normal error in one direction; below, the gate with the same probability in two directions.
 constexpr double kGateSigmas = 3.0;
 constexpr double kGateSquared = kGateSigmas * kGateSigmas;
 constexpr double kGateSquaredTwoDof = 11.83;
-// A motion must explain more than a rotation alone does: by this share of its own inliers, and by
-// this share of the tracks that the rotation leaves, of which it fits about 0.1 by chance.
+// A motion must explain more tracks than a pure rotation does: by this share of its own inliers, and by this
+// share of the tracks that the rotation does not explain, of which about 0.1 fit by chance.
 constexpr double kExtraInliers = 0.05;
 constexpr double kExtraOfUnexplained = 0.15;
 constexpr int kRefineSteps = 3;
 constexpr int kFinalRefineSteps = 6;
-// A step that lowers the cost by less than this share is the last.
+// Stop after a step that reduces the cost by less than this share.
 constexpr double kSettled = 1e-3;
 constexpr int kMaxRotationSamples = 60;
 constexpr std::size_t kLanes = 8;
-// After how many tracks the cost of a hypothesis is compared with the best.
+// Number of tracks after which the cost of a hypothesis is compared with the best.
 constexpr std::size_t kCostBlock = 64;
 // Keeps divisions finite for a bearing at the epipole; far below any noise squared.
 constexpr double kTiny = 1e-24;
@@ -141,7 +141,7 @@ Rays cross(const Rays& a, const Rays& b) {
 }
 Lanes dot(const Rays& a, const Rays& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-/// One a track; whole lanes: what stands behind the last track means nothing.
+/// One per track, in complete lanes: values after the last track are undefined.
 using Errors = std::array<double, kMaxFeatures>;
 
 // Squared errors over the gate of all tracks under a motion; 1 or more: outlier.
@@ -162,8 +162,8 @@ void gatedErrors(const Model& model, const MonoTracks& tracks, const Gates& gate
     const Lanes normal_squared = dot(normal, normal);
     const Lanes error =
         e * e / (gates.sampson_squared * (normal_squared + dot(cur_normal, cur_normal) + kTiny));
-    // With depths d' cur = d turned + t: d' and d are positive multiples of `towards` and `from`,
-    // and d / |t| = from / towards. Both are sines times |normal|, noisy by the parallax gate.
+    // With depths d' cur = d turned + t: d' and d are positive multiples of `towards` and `from`, and d / |t|
+    // = from / towards. Both are sines times |normal|, with the noise of the parallax gate.
     const Lanes slack = gates.parallax * normal_squared.sqrt();
     const Lanes towards = dot(cur, cross(turned, normal));
     const Lanes from = dot(normal, cur_normal) + slack;
@@ -176,7 +176,7 @@ void gatedErrors(const Model& model, const MonoTracks& tracks, const Gates& gate
   }
 }
 
-// Prior of the rotation; no information: free, infinite: fixed.
+// Prior of the rotation. Information zero: free; infinite: fixed.
 struct RotationPrior {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   double information = 0;  // [1/rad^2]
@@ -208,7 +208,7 @@ void addPrior(const RotationPrior& prior, const Eigen::Matrix3d& R, Eigen::Ref<E
   H.diagonal().array() += prior.information;
 }
 
-// One Gauss-Newton step of a rotation alone: cur - R Exp(phi) prev.
+// One Gauss-Newton step of a pure rotation: cur - R Exp(phi) prev.
 Model stepRotation(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior,
                    const Model& model) {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
@@ -228,8 +228,8 @@ Model stepRotation(const MonoTracks& tracks, const Gates& gates, const RotationP
   return next;
 }
 
-// One Gauss-Newton step of rotation and direction of translation on the Sampson errors of the
-// inliers, their gradients' lengths held (their change is second order in the errors).
+// One Gauss-Newton step of rotation and direction of translation on the Sampson errors of the inliers. The
+// lengths of their gradients are held constant (their change is second order in the errors).
 Model stepMotion(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior,
                  const Model& model) {
   using Vector5d = Eigen::Matrix<double, 5, 1>;
@@ -294,7 +294,7 @@ Model stepMotion(const MonoTracks& tracks, const Gates& gates, const RotationPri
   return next;
 }
 
-// Steps while the truncated cost falls.
+// Iterates while the truncated cost decreases.
 void refine(const MonoTracks& tracks, const Gates& gates, const RotationPrior& prior, int steps,
             Model& model) {
   if (model.turnsOnly() && prior.fixes()) return;
@@ -329,7 +329,7 @@ Model rotationConsensus(const MonoTracks& tracks, const Gates& gates, const Rans
   return best;
 }
 
-// The best of the four motions of an essential matrix, by the full gates.
+// The best of the four motions of an essential matrix, with all gates.
 Model motionOf(const Eigen::Matrix3d& E, const MonoTracks& tracks, const Gates& gates) {
   const EssentialMotions motions = motionsOfEssential(E);
   Model best;
@@ -393,7 +393,7 @@ Status MonoRansac::fivePoint(Bearings prev, Bearings cur, std::uint64_t seed, Ra
       to[i] = tracks_.curAt(sample[i]);
     }
     for (const Eigen::Matrix3d& E : essentialFromFivePoints(from, to)) {
-      // The further gates only add to this cost: a worse one cannot win.
+      // The other gates only increase this cost, so a worse one cannot win.
       if (!(essentialCost(E, tracks_, gates.sampson_squared, best.cost) < best.cost)) continue;
       Model model = motionOf(E, tracks_, gates);
       if (!(model.cost < best.cost)) continue;
@@ -422,7 +422,7 @@ Status MonoRansac::twoPoint(Bearings prev, Bearings cur, const Eigen::Quaternion
   rotation.R = prior.R;
   score(tracks_, gates, prior, rotation);
 
-  // Only tracks that moved beyond their noise carry a direction.
+  // Only tracks that moved by more than their noise determine a direction.
   std::array<std::size_t, kMaxFeatures> moved{};
   std::size_t moved_count = 0;
   Errors errors;

@@ -43,12 +43,12 @@ struct RansacSettings {
   /// Probability that at least one sample is free of false tracks.
   double confidence = 0.9999;
   int max_iterations = 300;
-  /// Standard deviation per axis [rad] of the given rotation (twoPoint), within which the refinement may
-  /// change it. Zero keeps the rotation.
+  /// Standard deviation per axis [rad] of the given rotation (twoPoint), used as its prior in the refinement.
+  /// Zero keeps the rotation fixed.
   double rotation_sigma = 1e-3;
-  /// Smallest plausible depth, relative to the distance flown between the frames.
+  /// Smallest plausible depth, relative to the distance travelled between the frames.
   double min_depth_over_baseline = 0.5;
-  /// Least number of inliers of a consensus.
+  /// Smallest number of inliers for a consensus.
   std::size_t min_inliers = 8;
 
   [[nodiscard]] bool valid() const {
@@ -64,7 +64,7 @@ struct RansacResult {
   FixedVector<bool, kMaxFeatures> inlier;
   std::size_t inlier_count = 0;
   int iterations = 0;
-  /// A pure rotation explains the tracks.
+  /// A pure rotation explains the tracks; there is no translation.
   bool no_parallax = false;
 };
 

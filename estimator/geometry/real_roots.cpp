@@ -19,8 +19,8 @@ double evaluate(const Polynomial& c, std::size_t degree, double x) {
   return value;
 }
 
-// The root between low and high, where the polynomial has opposite signs: Newton kept inside the
-// bracket by bisection.
+// The root between `low` and `high`, where the polynomial has opposite signs: Newton's method, kept inside
+// the bracket by bisection.
 double rootBetween(const Polynomial& c, std::size_t degree, double low, double high, double value_low) {
   double x = 0.5 * (low + high);
   for (int step = 0; step < kMaxSteps && high - low > kRootTolerance; ++step) {
@@ -41,8 +41,8 @@ double rootBetween(const Polynomial& c, std::size_t degree, double low, double h
   return x;
 }
 
-// Roots of the polynomial in [-1, 1], given in `brackets` the ends and the extrema between them;
-// replaced by the ends and the roots.
+// Roots of the polynomial in [-1, 1]. On entry `brackets` holds the ends and the extrema between them, on
+// return the ends and the roots.
 void descend(const Polynomial& c, std::size_t degree, Brackets& brackets) {
   Brackets roots;
   roots.at[roots.count++] = -1.0;
@@ -78,7 +78,7 @@ void rootsWithinUnit(const Polynomial& c, std::size_t degree, bool invert,
   for (std::size_t d = 1; d <= degree; ++d) descend(derivative[d], d, brackets);
   for (std::size_t i = 1; i + 1 < brackets.count; ++i) {
     const double root = brackets.at[i];
-    // The reversed polynomial has a root at zero when the leading coefficient vanishes.
+    // The reversed polynomial has a root at zero if the leading coefficient vanishes.
     if (invert && (root == 0 || std::abs(root) == 1.0)) continue;
     if (!roots.tryPushBack(invert ? 1.0 / root : root)) return;
   }

@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-// Camera centres closer than this [m] are one place: no baseline.
+// Camera centres closer than this [m] count as one: no baseline.
 constexpr double kMinExtent = 1e-9;
 constexpr double kMinHomogeneous = 1e-12;
 
@@ -20,7 +20,7 @@ double angleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// The ray most distant in angle from the one given.
+// The ray with the largest angle to the given one.
 std::size_t farthestRay(Bearings bearings, Poses poses, const Eigen::Vector3d& ray) {
   std::size_t best = 0;
   double lowest = 2;
@@ -77,7 +77,7 @@ Errors errorsAt(const Eigen::Vector3d& point, Bearings bearings, Poses poses) {
     const double distance = offset.norm();
     const Eigen::Vector3d seen = offset / distance;
     const double angle = angleBetween(seen, ray);
-    // Chord on the sphere, of which the part across the line of sight is the tangent error.
+    // Chord on the sphere; its component across the line of sight is the tangent error.
     const Eigen::Vector3d residual = seen - ray;
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - seen * seen.transpose()) / distance;
     errors.information += across * across;

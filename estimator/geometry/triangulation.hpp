@@ -1,5 +1,5 @@
 #pragma once
-// Triangulates a point from n >= 2 bearings at known poses, with figures of its quality.
+// Triangulates a point from n >= 2 bearings at known poses, with measures of its quality.
 //
 // Initial point: homogeneous DLT on unit bearings, (I - b b^T) (R^T (x - c)) = 0 stacked (Hartley, Zisserman,
 // "Multiple View Geometry", section 12.2, written for bearings), in coordinates centred and scaled by the
@@ -30,8 +30,8 @@ struct TriangulationSettings {
   double min_depth = 0.1;       ///< [m] distance to the nearest camera
   double max_depth = 200.0;     ///< [m] distance to the first camera
   double max_error = 0.01;      ///< [rad] largest error of a bearing; 4.5 px at 450 px focal length
-  double max_condition = 1e7;   ///< of the information matrix; its root is longest axis / shortest
-  int refine_steps = 3;         ///< Gauss-Newton steps; 0: only DLT
+  double max_condition = 1e7;  ///< of the information matrix; its square root is longest axis / shortest axis
+  int refine_steps = 3;        ///< Gauss-Newton steps; 0: only DLT
 };
 
 /// Known values are set for every state except kInvalidInput. `point` is only valid for kValid, kTooNear,
