@@ -8,17 +8,18 @@
 namespace swiftlet {
 namespace {
 
-// Older readings say less: the body has turned by an unknown bias since (4 degrees in 1 s at .08 rad/s).
+// Older readings are less useful, because the gyro's unknown bias rotates them (4 degrees in 1 s at 0.08
+// rad/s).
 constexpr double kLongestMean = 1.0;  // s
-// Sigma of the tilt: what the accelerometer's bias alone leaves, and what hard manoeuvres reach.
+// Sigma of the tilt: at least that from the accelerometer's bias, at most that of hard manoeuvres.
 constexpr double kDegree = 0.017453292519943295;
 constexpr double kLeastTiltSigma = 2.0 * kDegree;
 constexpr double kMostTiltSigma = 6.0 * kDegree;
-// Acceleration changes over some tenths of a second: readings closer than this are one.
+// Acceleration changes over some tenths of a second: readings within this time count as one.
 constexpr double kAccelerationTime = 0.3;  // s
-// A scatter seen in a short window underestimates the acceleration that stays constant in it.
+// In a short window, scatter does not show acceleration that stays constant.
 constexpr double kLeastAcceleration = 0.45;  // m/s^2, RMS per axis of hand-held and flown starts
-constexpr double kLeastForceShare = 0.5;     // of gravity: below it the body falls
+constexpr double kLeastForceShare = 0.5;     // of gravity: below it the body is falling
 
 }  // namespace
 
@@ -31,7 +32,7 @@ Eigen::Quaterniond gravityAlignedRotation(const Eigen::Vector3d& up) {
 
 Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise& noise,
                     const StartPrior& prior, TiltEstimate& tilt) {
-  // Backwards from `at`: R turns a reading's axes into those at `at`.
+  // Backwards from `at`: R rotates the axes of a reading to those at `at`.
   Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double sum_of_squares = 0;
@@ -60,7 +61,8 @@ Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise
   const double independent = 1.0 + tilt.duration / kAccelerationTime;
   const double manoeuvre =
       std::sqrt((variance + kLeastAcceleration * kLeastAcceleration) / independent) / noise.gravity;
-  const double excess = std::abs(mean.norm() - noise.gravity) / noise.gravity;  // acceleration that showed
+  const double excess = std::abs(mean.norm() - noise.gravity) / noise.gravity;  // acceleration visible in the
+                                                                                // mean
   const double sigma = std::hypot(manoeuvre, excess, prior.bias_accel_sigma / noise.gravity);
   tilt.sigma = std::clamp(sigma, kLeastTiltSigma, kMostTiltSigma);
   return okStatus();

@@ -46,7 +46,7 @@ ImuSegment makeSegment(const ImuSample* before, const ImuSample* after, Stamp fr
                        const ImuNoise& noise) {
   ImuSegment segment;
   segment.dt = (to - from).seconds();
-  double covered = 0;  // s over which the two readings must stand for the motion
+  double covered = 0;  // s of motion that the two readings represent
   if (before != nullptr && after != nullptr) {
     covered = (after->stamp - before->stamp).seconds();
     const double middle = (from - before->stamp).seconds() + 0.5 * segment.dt;

@@ -2,8 +2,8 @@
 // The integration rule of the IMU, shared by preintegration and propagation.
 //
 // A segment is an interval between two stamps with at most one sample on either side. Readings are linear
-// between samples and held beyond the last. The mean rate and mean force of a segment move the state. Time
-// not covered by data raises the noise, and a gap is not integrated.
+// between samples and held after the last one. The mean rate and mean force of a segment move the state. Time
+// not covered by data increases the noise; a gap is not integrated.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -17,13 +17,13 @@ namespace swiftlet {
 /// Largest interval between samples that counts as regular (jitter) [periods].
 inline constexpr double kRegularPeriods = 1.5;
 /// Longer intervals without a sample are gaps [periods]. 50 ms at 200 Hz: the readings at the ends no longer
-/// describe the motion in between.
+/// describe the motion between them.
 inline constexpr double kGapPeriods = 10.0;
 /// White acceleration that models unknown motion in a gap: 3 m/s after one second, m/s^2/sqrt(Hz).
 inline constexpr double kGapAccelDensity = 3.0;
 /// White rate that models unknown rotation in a gap: half a radian after one second, rad/s/sqrt(Hz).
 inline constexpr double kGapGyroDensity = 0.5;
-/// Factor on the noise variance of a saturated reading, which is only a lower bound: a hundredfold noise.
+/// Factor on the noise variance of a saturated reading, which is only a lower bound: 100 times the noise.
 inline constexpr double kSaturatedVarianceFactor = 1e4;
 
 struct ImuSegment {

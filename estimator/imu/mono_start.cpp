@@ -20,21 +20,21 @@ constexpr int kBiasIterations = 5;
 constexpr int kLinearIterations = 6;
 constexpr int kIterations = 12;
 constexpr int kPointIterations = 2;
-// Each bearing stands in two pairs (twice the information), and the noise of the planes is not that
-// of a linear model: measured on simulated flights, errors are up to twice what remains.
+// Each bearing is used in two pairs (twice the information), and the noise of the planes is not that of a
+// linear model: on simulated flights, errors are up to twice what would remain.
 constexpr double kBiasInflation = 8.0;  // on the variance
-// What the model leaves out (the IMU's own noise, scale and axes; vibration) costs so much scale on
-// the real logs however long the start; the covariance is raised to show it.
+// What the model omits (the IMU's own noise, scale and axes; vibration) limits the accuracy of the scale on
+// real logs, however long the start is; the covariance is increased accordingly.
 constexpr double kLeastScaleSigma = 0.04;
 constexpr double kHuber = 2.0;             // sigma
-constexpr double kOutlier = 3.0;           // sigma: a track's RMS beyond it is left out
+constexpr double kOutlier = 3.0;           // sigma: tracks with a larger RMS are rejected
 constexpr double kLeastParallax = 8.0;     // bearing sigmas
-constexpr double kInverseDepthPrior = 10;  // 1/m about 0: only to keep points without parallax finite
+constexpr double kInverseDepthPrior = 10;  // 1/m, about 0; only keeps points without parallax finite
 constexpr double kFirstSpeed = 1.0;        // m/s, for the first weights of the linear solve
 constexpr double kConverged = 1e-6;        // relative decrease of the cost
-// Noise puts some far points behind the camera; more than this share means a mirrored path.
+// Noise puts some far points behind the camera; a larger share than this means a mirrored path.
 constexpr double kMostBehind = 0.25;
-// First guesses, as multiples of the linear solution's velocity, tried until one fits.
+// Initial guesses, as multiples of the linear solution's velocity, tried until one fits.
 constexpr std::array<double, 4> kVelocityGuesses{1.0, -1.0, 3.0, -3.0};
 constexpr double kGoodFit = 1.5;      // residual RMS, whitened
 constexpr double kUselessTilt = 0.5;  // rad
@@ -49,7 +49,7 @@ struct CameraPose {
   Eigen::Vector3d c = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 3, StartParameters::kSize> d_c =
       Eigen::Matrix<double, 3, StartParameters::kSize>::Zero();
-  Eigen::Matrix3d d_phi = Eigen::Matrix3d::Zero();  // right error of R by the gyro bias
+  Eigen::Matrix3d d_phi = Eigen::Matrix3d::Zero();  // right error of R per gyro bias
   double variance = 0;                              // m^2 per axis, of the preintegrated position
 };
 using Cameras = FixedVector<CameraPose, kMaxMonoFrames>;
@@ -63,7 +63,7 @@ struct Problem {
   std::bitset<kMaxMonoTracks> rejected;
 
   [[nodiscard]] std::size_t frames() const { return from_first.size() + 1; }
-  // Frames of an epipolar pair lie a third of the start apart: parallax, and still many tracks.
+  // Frames of an epipolar pair are a third of the start apart, for parallax with still many common tracks.
   [[nodiscard]] std::size_t stride() const { return std::max<std::size_t>(1, from_first.size() / 3); }
 };
 
@@ -104,9 +104,9 @@ double huberCost(double whitened) {
   return whitened <= kHuber ? whitened * whitened : kHuber * (2.0 * whitened - kHuber);
 }
 
-// ---- Gyro bias by the eigenvalue method.
+// ---- Gyro bias with the eigenvalue method.
 
-// Adds one frame pair's normal equations by the gyro bias, the translation direction eliminated.
+// Adds the normal equations of one frame pair for the gyro bias, with the translation direction eliminated.
 void addBiasPair(const Problem& problem, const CameraPose& a, const CameraPose& b, std::size_t i,
                  std::size_t j, Eigen::Matrix3d& H, Eigen::Vector3d& g) {
   Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
@@ -224,7 +224,7 @@ Status linearSolve(const Problem& problem, const TiltEstimate& tilt, const Start
   return okStatus();
 }
 
-// ---- Refinement: reprojection errors, each point eliminated.
+// ---- Refinement: reprojection errors with each point eliminated.
 
 struct TrackPoint {
   std::size_t anchor = 0;
@@ -239,7 +239,7 @@ struct Sighting {
   double norm = 0;  // whitened
 };
 
-// `with_x` false: the point's derivatives only.
+// `with_x` false: only the derivatives by the point.
 Sighting sight(const Problem& problem, const Cameras& cameras, const TrackPoint& point,
                const Eigen::Matrix<double, 3, 2>& B, const Eigen::Vector3d& bearing, std::size_t k,
                bool with_x) {
@@ -267,7 +267,7 @@ Sighting sight(const Problem& problem, const Cameras& cameras, const TrackPoint&
   return s;
 }
 
-// The point that fits the track best with the cameras as they are.
+// The point that fits the track best for the current cameras.
 TrackPoint triangulate(const Problem& problem, const Cameras& cameras, const BearingTrack& track) {
   TrackPoint point;
   while (!seenIn(track, point.anchor)) ++point.anchor;
@@ -299,9 +299,9 @@ struct Normal {
   double squares = 0;
   int rows = 0;
   int tracks = 0;
-  int behind = 0;  // tracks whose point lies behind its camera
+  int behind = 0;  // tracks whose point is behind its camera
 
-  // n . d = 0 does not know the sign of d: a mirrored path puts the points behind the cameras.
+  // n . d = 0 does not determine the sign of d: on a mirrored path the points are behind the cameras.
   [[nodiscard]] double shareBehind() const { return tracks > 0 ? static_cast<double>(behind) / tracks : 0.0; }
 };
 
@@ -339,7 +339,7 @@ void addTrack(const Problem& problem, const Cameras& cameras, const BearingTrack
   mean_square = squares / std::max(1, 2 * sightings - 3);
 }
 
-// Linearizes all tracks; `reject`: leaves out those that fit badly from now on.
+// Linearizes all tracks. `reject`: excludes tracks that fit badly from now on.
 Normal linearize(Problem& problem, const StartParameters& x, const TiltEstimate& tilt,
                  const StartPrior& prior, bool reject) {
   Cameras cameras;
@@ -365,7 +365,7 @@ Normal linearize(Problem& problem, const StartParameters& x, const TiltEstimate&
   return normal;
 }
 
-// Levenberg-Marquardt; `normal` is left linearized at the final x.
+// Levenberg-Marquardt; `normal` is linearized at the final x.
 bool refine(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior, StartParameters& x,
             Normal& normal) {
   double lambda = 1e-3;
@@ -392,7 +392,7 @@ bool refine(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior,
   return true;
 }
 
-// The refinement from several first guesses; the best fit with its points before the cameras.
+// Refines from several initial guesses; selects the best fit with its points in front of the cameras.
 bool refineBest(Problem& problem, const TiltEstimate& tilt, const StartPrior& prior, StartParameters& x,
                 Normal& normal) {
   const StartParameters linear = x;
@@ -435,7 +435,7 @@ double medianParallax(const Problem& problem, const Cameras& cameras) {
   return *middle;
 }
 
-// Sigma of s in path -> (1 + s) path: the part of an error that is along the path itself.
+// Sigma of s in path -> (1 + s) path, from the component of the error along the path.
 double scaleSigma(const Cameras& cameras, const Matrix11d& covariance) {
   Row11d along = Row11d::Zero();
   double squares = 0;
@@ -457,7 +457,7 @@ Problem makeProblem(std::span<const Preintegration> from_first, std::span<const 
                   bearing_sigma,
                   gravity,
                   {}};
-  // Sightings beyond the frames in use do not count; one sighting says nothing.
+  // Observations in frames that are not used do not count; a single observation gives no information.
   const std::uint32_t mask = (1U << problem.frames()) - 1U;
   for (std::size_t t = 0; t < problem.tracks.size(); ++t) {
     if (std::popcount(problem.tracks[t].seen & mask) < 2) problem.rejected.set(t);
@@ -512,7 +512,7 @@ Status solveMonoStart(std::span<const Preintegration> from_first, std::span<cons
   if (llt.info() != Eigen::Success) return {StatusCode::kDegenerate, "start equations are singular"};
   Matrix11d covariance = llt.solve(Matrix11d::Identity());
   start.motion.residual_rms = std::sqrt(normal.squares / std::max(1, normal.rows));
-  // Residuals larger than their sigma: the bearings' noise was given too small.
+  // Residuals larger than their sigma mean that the bearings' noise was given too small.
   const double excess = std::max(1.0, start.motion.residual_rms);
   covariance *= excess * excess;
   makeCameras(problem, x, cameras);

@@ -2,10 +2,10 @@
 // Start in motion with one camera: velocity (hence scale), tilt and biases from bearings and IMU.
 //
 // Model: the camera's positions follow from v, tilt and biases as in start_parameters.hpp. A track seen in
-// frames i and j gives n . (c_j - c_i) = 0 with n = (R_i f_i) x (R_j f_j), linear in v and gravity and
-// without a point. Steps: gyro bias by the smallest eigenvalue of sum n n' per frame pair; linear v and tilt,
-// reweighted to angular residuals; then Levenberg-Marquardt on the angular reprojection errors of all tracks
-// with the points eliminated, which gives the covariance.
+// frames i and j gives n . (c_j - c_i) = 0 with n = (R_i f_i) x (R_j f_j), which is linear in v and gravity
+// and needs no point. Steps: gyro bias from the smallest eigenvalue of sum n n' per frame pair; linear v and
+// tilt, reweighted to angular residuals; then Levenberg-Marquardt on the angular reprojection errors of all
+// tracks with the points eliminated, which gives the covariance.
 // Scale is observable only with acceleration, and `scale_sigma` tells how well it is known. It is large near
 // constant velocity, pure rotation and rest, and the caller must then wait (docs/imu.md).
 // Frames: body axes at image 0.
@@ -56,8 +56,8 @@ Status solveMonoStart(std::span<const Preintegration> from_first, std::span<cons
                       const ImuNoise& noise, const StartPrior& prior, MonoStart& start);
 
 /// Gyro bias only: minimizes the smallest eigenvalues of the epipolar planes over bg, with or without
-/// translation. `sigma`: rad/s, the largest principal sigma, prior included. Only an initial guess: if
-/// rotation and sideways motion look alike (3 % of simulated starts), it is off by 5 to 15 sigma.
+/// translation. `sigma`: rad/s, the largest principal sigma, prior included. Use it only as an initial guess:
+/// if rotation and sideways motion look alike (3 % of simulated starts), it is off by 5 to 15 sigma.
 Status solveGyroBias(std::span<const Preintegration> from_first, std::span<const BearingTrack> tracks,
                      const SE3& T_body_cam, double bearing_sigma, const StartPrior& prior,
                      Eigen::Vector3d& bias_gyro, double& sigma);

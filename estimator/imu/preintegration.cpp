@@ -34,7 +34,7 @@ void Preintegration::integrate(double dt, const Eigen::Vector3d& gyro, const Eig
   propagateCovariance(dt, force, gyro_factor * noise_.gyro_density * noise_.gyro_density * dt,
                       accel_factor * noise_.accel_density * noise_.accel_density * dt);
 
-  // The bias turns the middle attitude by d theta_half; p follows v by the trapezoid rule.
+  // The bias rotates the middle attitude by d theta_half; p follows v by the trapezoid rule.
   const Eigen::Matrix3d theta_half = theta_gyro_ - (0.5 * dt) * R * step.half_left_jacobian;
   const Eigen::Matrix3d v_gyro_before = v_gyro_;
   v_gyro_ -= cross(dt * force, theta_half);
@@ -53,8 +53,8 @@ void Preintegration::integrate(double dt, const Eigen::Vector3d& gyro, const Eig
 void Preintegration::propagateCovariance(double dt, const Eigen::Vector3d& force, double gyro_variance,
                                          double accel_variance) {
   // theta' = theta + w,  v' = v - dt f x (theta + w / 2) + n dt,  p' = p + dt (v + v') / 2.
-  // Half of w's variance goes in before, half after: the covariance of theta and v is then exact,
-  // that of v too large by dt^3 f^2 gyro_density^2 / 4, which is nothing.
+  // Half of w's variance is added before and half after: the covariances of theta and v are then exact,
+  // except that v's is too large by a negligible dt^3 f^2 gyro_density^2 / 4.
   const Eigen::Vector3d a = -dt * force;
   cov_.theta_theta.diagonal().array() += 0.5 * gyro_variance;
   const Eigen::Matrix3d f_theta = cross(a, cov_.theta_theta);      // cov(a x theta, theta)
@@ -71,8 +71,8 @@ void Preintegration::propagateCovariance(double dt, const Eigen::Vector3d& force
   const Eigen::Matrix3d p_sum = cov_.p_v + p_vnew;  // cov(p, v + v')
   cov_.p_p +=
       h * (p_sum + p_sum.transpose()) + (h * h) * (cov_.v_v + v_vnew + v_vnew.transpose() + vnew_vnew);
-  // White acceleration within the step: int t^2 = dt^3 / 3, of which the trapezoid rule has dt^3 / 4. Without
-  // it the covariance of a single step is singular.
+  // White acceleration within the step: int t^2 = dt^3 / 3, of which the trapezoid rule contains dt^3 / 4.
+  // Without the rest the covariance of a single step would be singular.
   cov_.p_p.diagonal().array() += accel_variance * dt * dt / 12.0;
   cov_.p_v = p_vnew + h * (v_vnew + vnew_vnew);
   cov_.v_v = vnew_vnew;
@@ -83,8 +83,8 @@ void Preintegration::propagateCovariance(double dt, const Eigen::Vector3d& force
 void Preintegration::bridgeGap(double dt, const Eigen::Vector3d& accel) {
   const Eigen::Matrix3d R = rotation_.toRotationMatrix();
   const Eigen::Vector3d force = R * (accel - bias_accel_);
-  // The unknown turn in the gap does not turn the force: a hovering body pushes up whatever its
-  // attitude did. So the rate's variance goes in after the step, not through it.
+  // The unknown rotation in the gap does not rotate the force: a hovering body pushes up whatever its
+  // attitude was. So the rate's variance is added after the step.
   propagateCovariance(dt, force, 0, kGapAccelDensity * kGapAccelDensity * dt);
   cov_.theta_theta.diagonal().array() += kGapGyroDensity * kGapGyroDensity * dt;
   const Eigen::Matrix3d v_gyro_before = v_gyro_;

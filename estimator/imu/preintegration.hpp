@@ -9,9 +9,10 @@
 // Scheme: samples are linear between their stamps; rotation by the mean rate of the interval, specific force
 // at its middle attitude (second order in the step). Internally the rotation error is in the axes of i (theta
 // = dR phi): the transition is then identity except for skew blocks, and isotropic noise needs no rotation.
-// Not covered by samples: for a hole or a held reading of n > 1.5 periods the noise variance is multiplied by
-// n^2. Beyond 10 periods it is a gap: attitude is held and the force is that of the ends of the gap, with the
-// noise of an unknown motion (integration_rule.hpp). The noise of saturated readings is multiplied by 100.
+// Time not covered by samples: for a gap or a held reading of n > 1.5 periods the noise variance is
+// multiplied by n^2. Beyond 10 periods attitude is held and the force is that of the ends of the gap, with
+// the noise of an unknown motion (integration_rule.hpp). The noise of saturated readings is multiplied by
+// 100.
 // Cost: about 0.15 us per sample. Memory: 1.2 kB. No allocation.
 // Source: Forster, Carlone, Dellaert, Scaramuzza, "On-Manifold Preintegration for Real-Time
 // Visual-Inertial Odometry", T-RO 2017 (arXiv 1512.02363), equations 26-38, A.7-A.10 (with the

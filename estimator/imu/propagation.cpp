@@ -40,7 +40,7 @@ Matrix15d transition(const Transition& t, const Matrix15d& x) {
   return out;
 }
 
-// Over a step: int t = dt^2 / 2 and int t^2 = dt^3 / 3.
+// Integrals over a step: int t = dt^2 / 2 and int t^2 = dt^3 / 3.
 void addWhiteAcceleration(Matrix15d& P, double variance, double dt) {
   for (int i = 0; i < 3; ++i) {
     P(kVelocity + i, kVelocity + i) += variance;
@@ -55,7 +55,7 @@ void addWalks(Matrix15d& P, const ImuNoise& noise, double dt) {
   P.diagonal().segment<3>(kBiasAccel).array() += noise.accel_walk * noise.accel_walk * dt;
 }
 
-// Turns the rotation error's axes: rows and columns by R.
+// Rotates the axes of the rotation error: rows and columns by R.
 void turnRotationError(Matrix15d& P, const Eigen::Matrix3d& R) {
   P.topRows<3>() = (R * P.topRows<3>()).eval();
   P.leftCols<3>() = (P.leftCols<3>() * R.transpose()).eval();
@@ -101,7 +101,7 @@ void Propagator::Current::advanceMeasured(const ImuSegment& segment, const ImuNo
   const Eigen::Matrix3d R_half = middle.toRotationMatrix();
   const Eigen::Vector3d force = R_half * (segment.accel - nav.bias_accel);
 
-  // Half of the rate's variance before the step, half after it, as in Preintegration.
+  // Half of the rate's variance is added before the step, half after it, as in Preintegration.
   Matrix15d& P = nav.covariance;
   const double gyro_variance = segment.gyro_factor * noise.gyro_density * noise.gyro_density * dt;
   P.diagonal().segment<3>(kTheta).array() += 0.5 * gyro_variance;

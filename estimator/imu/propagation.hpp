@@ -31,15 +31,15 @@ class Propagator {
  public:
   explicit Propagator(const ImuNoise& noise) : noise_(noise) {}
 
-  /// Takes a smoothed state with the intrinsics estimated with its biases, and re-applies the samples after
-  /// its stamp. A state later than the last sample is kept; the next sample starts from it.
+  /// Takes a smoothed state and the intrinsics estimated together with its biases, and re-applies the samples
+  /// after its stamp. A state later than the last sample is kept; the next sample starts from it.
   Status setState(const NavState& state, const GyroIntrinsics& intrinsics = {});
 
   /// Takes one sample. Writes the state at its stamp to `state`, which may be null.
   Status step(const ImuSample& sample, NavState* state = nullptr);
 
-  /// The state at `at`, not stored: the prediction for an image. After the last sample by holding its
-  /// reading, before it from the state set on. kInvalidInput if `at` is before the state set.
+  /// The predicted state at `at`, for an image; nothing is stored. After the last sample its reading is held;
+  /// before it the prediction starts from the last state set. kInvalidInput if `at` is before that state.
   Status predict(Stamp at, NavState& state) const;
 
   [[nodiscard]] bool hasState() const { return has_state_; }
@@ -48,7 +48,7 @@ class Propagator {
   /// Seconds bridged without samples since the stamp of the last state set.
   [[nodiscard]] double gapSeconds() const { return current_.gap_seconds; }
 
-  /// For the samples from now on, and for those after the next state set.
+  /// Noise for the following samples, and for those re-applied after the next setState().
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
 
   /// Forgets the state; samples are kept for the next one.
@@ -76,7 +76,7 @@ class Propagator {
   [[nodiscard]] std::uint64_t oldestKept() const { return count_ - std::min<std::uint64_t>(count_, kRing); }
   /// Index of the first kept sample after `stamp`; count_ if there is none.
   [[nodiscard]] std::uint64_t firstAfter(Stamp stamp) const;
-  /// Over the samples after the state, then holding the last one.
+  /// Advances over the samples after the state, then holds the last one.
   void advance(Current& state, Stamp to) const;
   [[nodiscard]] const ImuSample& sampleAt(std::uint64_t index) const { return ring_[index % kRing]; }
 
@@ -84,8 +84,8 @@ class Propagator {
   std::array<ImuSample, kRing> ring_{};
   std::uint64_t count_ = 0;  // number of samples taken; the ring holds the last kRing
   bool has_state_ = false;
-  Current given_;    // as set
-  Current current_;  // moved over the samples since
+  Current given_;    // as set by setState()
+  Current current_;  // advanced by the samples since
 };
 
 }  // namespace swiftlet

@@ -8,53 +8,55 @@ namespace swiftlet {
 namespace {
 
 constexpr Duration kBlock = Duration::fromMilliseconds(50);
-// A longer silence breaks the windows: what happened in it is unknown.
+// A longer silence restarts the windows, because the motion in it is unknown.
 constexpr Duration kMaxSilence = Duration::fromMilliseconds(50);
 
-// Slow band (RMS of 0.1 s means about their mean over 1 s). Measured on the eleven EuRoC sequences:
-// standing, idling rotors included, 90 % below 0.005 rad/s and 0.07 m/s^2; flying, 99.9 % above
-// 0.014 and 0.053. The limit is kQuietFactor times the quietest window, between these bounds.
+// Slow band: RMS of 0.1 s means about their mean over 1 s. On the eleven EuRoC sequences 90 % are below 0.005
+// rad/s and 0.07 m/s^2 when standing, idling rotors included, and 99.9 % above 0.014 and 0.053 when flying.
+// The limit is kQuietFactor times the quietest window, between these bounds.
 constexpr double kSlowGyroLow = 0.003;   // rad/s
 constexpr double kSlowGyroHigh = 0.007;  // rad/s
 constexpr double kSlowAccelLow = 0.04;   // m/s^2
 constexpr double kSlowAccelHigh = 0.05;  // m/s^2
 constexpr double kQuietFactor = 8.0;
 
-// Whole band: idling rotors shake up to 0.06 rad/s and 0.9 m/s^2 (same logs); a shaker or an engine more.
+// Whole band: idling rotors cause up to 0.06 rad/s and 0.9 m/s^2 (same logs); a shaker or an engine causes
+// more.
 constexpr double kGyroLimit = 0.06;
 constexpr double kAccelLimit = 0.9;
-// The short window decides alone only when the rotors are off: that scatter is the sensor's own.
+// The short window decides alone only with the rotors off, when the scatter is the sensor's own.
 constexpr double kShortGyroLimit = 0.012;
 constexpr double kShortAccelLimit = 0.15;
 constexpr double kShortSlowFactor = 0.8;
 // At rest the newest 0.5 s may reach this multiple of the limits before the rest ends.
 constexpr double kHoldFactor = 1.3;
-// With still images the limits may be so much wider.
+// Wider limits if the images are still.
 constexpr double kImageSlowFactor = 3.0;  // of the upper slow limits
 constexpr double kImageGyroLimit = 0.1;
 constexpr double kImageAccelLimit = 1.5;
 
-// A sample further from the window's mean than this multiple of its deviation ends a rest.
+// A sample that differs from the window's mean by more than this multiple of its deviation ends a rest.
 constexpr double kJump = 5.0;
 constexpr double kJumpGyroFloor = 0.01;   // rad/s: the last digits of coarse sensors
 constexpr double kJumpAccelFloor = 0.15;  // m/s^2
 
-// A 50 ms mean further from the window's mean than this multiple of the slow deviation ends it too.
+// A 50 ms mean that differs from the window's mean by more than this multiple of the slow deviation ends it
+// too.
 constexpr double kDrift = 5.0;
 constexpr double kDriftGyroFloor = 0.006;  // rad/s
 constexpr double kDriftAccelFloor = 0.06;  // m/s^2
 
-// Both may be so much larger while the images move slowly: rotors that spin up reach 1.7 times, a
-// take-off 3.4 (EuRoC V1_01, MH_05).
+// Factor on both thresholds while the images move slowly: rotors that spin up reach 1.7 times, a take-off 3.4
+// times the threshold (EuRoC V1_01, MH_05).
 constexpr double kSlowSlack = 2.5;
 
-constexpr Duration kImageLife = Duration::fromMilliseconds(300);  // an older verdict says nothing
+constexpr Duration kImageLife = Duration::fromMilliseconds(300);  // older verdicts are ignored
 
-constexpr double kUnknownBias = 0.15;   // rad/s: a larger mean rate is no bias of a working sensor
+constexpr double kUnknownBias = 0.15;   // rad/s; a larger mean rate cannot be the bias of a working sensor
 constexpr double kBiasMargin = 0.005;   // rad/s beyond 3 sigma of the known bias
 constexpr double kGravityMargin = 0.6;  // m/s^2: accelerometer bias and scale
-constexpr double kStandingSpeed = 0.1;  // m/s beyond 3 sigma: the estimate says that it moves
-constexpr double kSurelySlow = 0.03;    // m/s, speed + 2 sigma below it: the body is not moving
+constexpr double kStandingSpeed = 0.1;  // m/s beyond 3 sigma; a faster estimate is in motion
+constexpr double kSurelySlow = 0.03;    // m/s; with speed + 2 sigma below it the body is not moving
 
 double rms(const Eigen::Vector3d& squares, const Eigen::Vector3d& sum, double count) {
   const double variance = (squares / count - (sum / count).cwiseAbs2()).sum() / 3.0;
@@ -94,7 +96,7 @@ void RestDetector::addImu(const ImuSample& sample) {
 }
 
 void RestDetector::addFrame(Stamp stamp, ImageMotion motion) {
-  // Images are back: the IMU alone cannot tell rest from constant velocity, so they have to confirm it.
+  // Images are back. They must confirm a rest, because the IMU alone cannot tell rest from constant velocity.
   const bool first = images() == ImageMotion::kUnknown && motion == ImageMotion::kUncertain;
   image_motion_ = motion;
   image_stamp_ = stamp;
@@ -180,7 +182,7 @@ bool RestDetector::drifts(const Block& block) const {
          (block.accel / block.count - window_accel_).cwiseAbs().maxCoeff() > slack * drift_accel_;
 }
 
-// How much more than usual a reading has to differ to end a rest.
+// Factor by which a reading must differ more than usual to end a rest.
 double RestDetector::imuSlack() const { return shaken() ? kSlowSlack : 1.0; }
 
 void RestDetector::closeBlock() {

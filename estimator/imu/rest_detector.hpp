@@ -55,8 +55,8 @@ class RestDetector {
 
   void addFrame(Stamp stamp, ImageMotion motion);
 
-  /// Takes the estimate of a converged smoother; without it biases up to 0.15 rad/s pass. `bias_gyro_sigma`:
-  /// rad/s. `speed`, `speed_sigma`: m/s; infinite sigma if the speed is unknown.
+  /// Takes the estimate of a converged smoother. Without it mean rates up to 0.15 rad/s are accepted as bias.
+  /// `bias_gyro_sigma`: rad/s. `speed`, `speed_sigma`: m/s; infinite sigma if the speed is unknown.
   void setEstimate(const Eigen::Vector3d& bias_gyro, double bias_gyro_sigma, double speed,
                    double speed_sigma);
 
@@ -89,7 +89,7 @@ class RestDetector {
 
   [[nodiscard]] Window window(std::size_t blocks) const;
   [[nodiscard]] ImageMotion images() const;
-  /// Images move slowly.
+  /// Whether the images move slowly.
   [[nodiscard]] bool shaken() const;
   [[nodiscard]] bool imagesHold() const;
   [[nodiscard]] bool meansAllow(const Window& w) const;
@@ -115,7 +115,8 @@ class RestDetector {
   bool has_last_ = false;
   Stamp last_;
   Block rest_;                                           // sums over the rest
-  Eigen::Vector3d jump_gyro_ = Eigen::Vector3d::Zero();  // per axis, from the mean of the window
+  Eigen::Vector3d jump_gyro_ = Eigen::Vector3d::Zero();  // largest difference from the window's mean, per
+                                                         // axis
   Eigen::Vector3d jump_accel_ = Eigen::Vector3d::Zero();
   double drift_gyro_ = 0;
   double drift_accel_ = 0;

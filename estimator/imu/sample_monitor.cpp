@@ -10,13 +10,13 @@ namespace {
 
 // Relative difference from the nominal rate that counts as a wrong calibration.
 constexpr double kRateTolerance = 0.1;
-// The interval's mean follows the newest this many intervals (clock drift, temperature).
+// The mean interval follows about this many newest intervals (clock drift, temperature).
 constexpr std::uint64_t kIntervalMemory = 4000;
-// So many equal readings in a row, at an extreme, show a clipped axis: noise moves the last digit
-// of an axis that still measures, and 5 samples (25 ms at 200 Hz) are too many for chance.
+// This many equal extreme readings in a row mean a clipped axis: on a working axis noise changes the last
+// digit, and 5 samples (25 ms at 200 Hz) are too many for chance.
 constexpr int kClippedRun = 5;
-// Only readings beyond these are extremes: a quarter of the smallest common ranges (250 deg/s, 2 g)
-// would be normal flight, the full ranges are not.
+// Only readings beyond these count as extreme: about the smallest common ranges (250 deg/s, 2 g). A quarter
+// of them would be normal flight.
 constexpr double kExtremeGyro = 4.3;    // rad/s
 constexpr double kExtremeAccel = 19.0;  // m/s^2
 
@@ -51,7 +51,7 @@ void SampleMonitor::learnRate(double interval) {
   if (interval_count_ < kFirstIntervals) {
     first_[interval_count_++] = interval;
     if (interval_count_ < kFirstIntervals) return;
-    // There may be holes among them, and the nominal rate does not tell.
+    // Use the median: some intervals may contain gaps, and the nominal rate may be wrong.
     const auto middle = first_.begin() + kFirstIntervals / 2;
     std::nth_element(first_.begin(), middle, first_.end());
     interval_sum_ = *middle * kFirstIntervals;

@@ -1,5 +1,5 @@
 #pragma once
-// Checks every IMU sample, and learns from them what the noise model has wrong.
+// Checks every IMU sample, and learns from the samples where the noise model is wrong.
 //
 // Drops samples that are not finite or whose stamp is repeated or reversed. Finds gaps, measures the rate,
 // and flags saturated samples: a component at or beyond the noise model's limit, or a run of identical
@@ -29,11 +29,12 @@ class SampleMonitor {
 
   SampleVerdict check(const ImuSample& sample);
 
-  /// As given, but with the rate of the samples if that differs by more than 10 %, and with the limits that
-  /// runs of identical extremes show.
+  /// The given noise model, but with the measured rate if that differs by more than 10 %, and with the
+  /// saturation limits found in runs of identical extreme readings.
   [[nodiscard]] const ImuNoise& noise() const { return noise_; }
 
-  /// Call if the stream continues at other stamps: the next sample is the first. Rate and limits are kept.
+  /// Call if the stream continues at other stamps: the next sample counts as the first. Rate and limits are
+  /// kept.
   void restart();
 
  private:
@@ -43,7 +44,7 @@ class SampleMonitor {
     int length = 0;
   };
 
-  // Before so many the rate is not believed.
+  // Intervals needed before the rate is used.
   static constexpr std::size_t kFirstIntervals = 20;
 
   void learnRate(double interval);
@@ -54,8 +55,8 @@ class SampleMonitor {
   std::array<Run, 6> runs_{};
   bool has_last_ = false;
   Stamp last_;
-  std::array<double, kFirstIntervals> first_{};  // s, until there are all
-  double interval_sum_ = 0;                      // s, of intervals without a hole
+  std::array<double, kFirstIntervals> first_{};  // s, while fewer than kFirstIntervals
+  double interval_sum_ = 0;                      // s, of intervals without gaps
   std::uint64_t interval_count_ = 0;
   bool learned_ = false;
 };

@@ -2,7 +2,7 @@
 // The rotation of the body while the rows of a rolling shutter are read, from the gyro.
 //
 // If samples end at the image's stamp, as in a log ordered by stamp, the rate after it is extrapolated from
-// the change before. Cost: about 1 us. No allocation.
+// its change before. Cost: about 1 us. No allocation.
 
 #include <Eigen/Core>
 #include <span>

@@ -32,7 +32,7 @@ StartPose StartParameters::poseAt(const Preintegration& imu, double gravity) con
 void StartParameters::addPrior(const TiltEstimate& tilt, const StartPrior& prior,
                                Eigen::Ref<Matrix, 0, Eigen::OuterStride<>> H, Eigen::Ref<Vector> b) const {
   const Eigen::Matrix<double, 3, 2> B = basis();
-  // The tilt's residual up - up_measured, of which hat(up) B spans the tangent plane.
+  // Residual of the tilt: up - up_measured, in the tangent plane spanned by hat(up) B.
   const Eigen::Matrix<double, 3, 2> D = hat(up_) * B;
   const double tilt_weight = 1.0 / (tilt.sigma * tilt.sigma);
   H.block<2, 2>(kTilt, kTilt) += tilt_weight * D.transpose() * D;
