@@ -10,16 +10,17 @@
 
 namespace swiftlet {
 
-/// Prior standard deviations of the given calibration, used when it is estimated in flight.
-/// A driver that stamps images at arrival is off by 15 ms, 1.5 sigma.
+/// Prior standard deviations of the given calibration if it is estimated in flight. A driver that stamps
+/// images at their arrival has an error of 15 ms, 1.5 sigma.
 inline constexpr double kTimeOffsetPriorSigma = 10e-3;  ///< s
-/// Line times from drivers and data sheets are exact; those of other modes or from other tools are within a
-/// few per cent of 20 to 60 ms.
+/// Readouts from drivers and data sheets are exact; those of another mode or from other tools have errors of
+/// a few per cent of 20 to 60 ms.
 inline constexpr double kReadoutPriorSigma = 2e-3;            ///< s
 inline constexpr double kExtrinsicRotationPriorSigma = 0.01;  ///< rad
-/// Calibrations give positions relative to the IMU to a few millimetres.
+/// Calibrations give positions relative to the IMU with errors of a few millimetres.
 inline constexpr double kExtrinsicPositionPriorSigma = 2e-3;  ///< m
-/// Calibrations give the length of the baseline, the scale of two cameras, to one part in a thousand.
+/// Calibrations give the length of the baseline, which is the scale of two cameras, to one part in a
+/// thousand.
 inline constexpr double kBaselinePriorSigma = 1e-3;
 
 /// Sigmas: largest over the axes, from the last solve; 0 if the value is not estimated.

@@ -2,8 +2,9 @@
 // Scale and misalignment of a gyro: reading = (I + matrix) rate + bias, in body axes.
 //
 // 0.01 on the diagonal is a scale error of 1 %; 0.01 elsewhere is an axis tilted by 0.01 rad. Those of the
-// accelerometer are not modelled: in simulated flights their effect is negligible beside the gyro's, and with
-// one camera its scale could not be separated from that of the flight. g-sensitivity is not modelled.
+// accelerometer are not modelled: in simulated flights their effect is negligible compared with the gyro's,
+// and with one camera the accelerometer's scale cannot be separated from that of the flight. g-sensitivity is
+// not modelled.
 
 #include <Eigen/Core>
 

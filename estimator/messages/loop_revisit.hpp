@@ -1,6 +1,6 @@
 #pragma once
-// A verified loop closure for full smoothing: two keyframes, their measured relative pose, and the pairs of
-// features that are the same point.
+// A verified loop closure for full smoothing: two keyframes, their measured relative pose, and pairs of
+// features that observe the same point.
 
 #include <Eigen/Core>
 #include <array>

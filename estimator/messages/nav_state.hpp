@@ -12,8 +12,8 @@ namespace swiftlet {
 enum class Health : std::uint8_t {
   kInitializing,  ///< no pose yet, or tilt and velocity are not settled
   kGood,
-  kDegraded,  ///< usable, with less than nominal input: one camera, few tracks, coasting
-  kFailed,    ///< do not fly on this
+  kDegraded,  ///< usable, with less than the usual input: one camera, few tracks, coasting
+  kFailed,    ///< must not be used for flight
 };
 
 /// Error-state order everywhere: phi, p, v, bg, ba (rotation on the right: R <- R Exp(phi)).

@@ -20,7 +20,7 @@ enum class EventKind : std::uint8_t {
   kFrameDropped,     ///< value: frames refused (repeated or reversed stamp, wrong size)
   kCameraLost,       ///< value: camera
   kCameraBack,       ///< value: camera
-  kBlackoutStarted,  ///< value: seconds without an accepted image; longer than health "good" allows
+  kBlackoutStarted,  ///< value: seconds without an accepted image, more than health "good" allows
   kBlackoutEnded,    ///< value: seconds it lasted
   kRestStarted,
   kRestEnded,
@@ -28,14 +28,15 @@ enum class EventKind : std::uint8_t {
   kHealthChanged,    ///< value: the new Health
   kReset,            ///< value: the new epoch
   kCapacityReached,  ///< value: items dropped
-  kStampsWentBack,   ///< value: seconds by which the IMU's stamps went back permanently; a new epoch begins
-  kDoubt,            ///< value: the Doubt because of which health is not good
+  kStampsWentBack,   ///< value: seconds by which the IMU's stamps went back for good; a new epoch begins
+  kDoubt,            ///< value: the Doubt that prevents health "good"
 };
 
 /// The reason why health is not good: the first condition in this order that holds.
 enum class Doubt : std::uint8_t {
   kNone,
-  kNoImage,         ///< no image accepted for 0.3 s: coasting on the IMU
+  kNoImage,  ///< no image accepted for 0.3 s, longer for slow cameras (HealthMonitor::goodAge()): coasting on
+             ///< the IMU
   kImplausible,     ///< speed or acceleration above the vehicle's limits
   kTracksDisagree,  ///< many tracks contradict a single motion: wrong calibration, rolling shutter or stamps,
                     ///< or a moving scene

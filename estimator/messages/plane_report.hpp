@@ -29,7 +29,7 @@ struct ReportedPlane {
 struct ReportedPoint {
   TrackId id = 0;
   std::uint64_t plane = 0;  ///< id of the plane that it lies on
-  /// False: among the points of the plane, but too uncertain to be distinguished from something in front.
+  /// False: one of the plane's points, but too uncertain to be distinguished from an object in front of it.
   /// Such points are drawn on the plane but not tied to it.
   bool firm = true;
 };
@@ -40,7 +40,7 @@ struct PlaneReport {
   std::uint64_t frame_index = 0;  ///< of that keyframe
   FixedVector<ReportedPlane, kMaxPlanes> planes;
   FixedVector<ReportedPoint, kMaxLandmarks>
-      points;  ///< firm ones first, best known first, then the others; each once
+      points;  ///< firm ones first, most accurate first, then the others; no duplicates
 };
 
 }  // namespace swiftlet

@@ -2,8 +2,8 @@
 // Motion of the body while the rows of a rolling shutter were read. Zero: global shutter, or unknown.
 //
 // Rows are read at their own times around the image's stamp, which is that of the middle row (Rig::rowTime).
-// There is one mean rate for the rows before the middle and one for those after it; the angular acceleration
-// within 10 ms is neglected, some 0.05 px at 10 rad/s^2. Frames: body = IMU.
+// There is one mean rate for the rows before the middle and one for those after it; neglecting the angular
+// acceleration within 10 ms costs about 0.05 px at 10 rad/s^2. Frames: body = IMU.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

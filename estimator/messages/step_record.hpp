@@ -1,6 +1,6 @@
 #pragma once
-// Which inputs each stage used for a step, to repeat a threaded run, in which timing decides what a stage
-// sees.
+// The inputs that each stage used for a step, so that a threaded run, in which timing decides what a stage
+// sees, can be repeated.
 //
 // Numbers count from 1 in the order of arrival at the estimator; 0 is none. IMU samples and the images of
 // each camera are numbered over the run, windows and fixes in the order in which `smooth` published them,
