@@ -59,7 +59,8 @@ void EventWatch::step(const Frame& frame, EventBuffer& events) {
   watchBlackout(frame.stamp, frame.seconds_without_image, events);
 }
 
-// With each change of health, and while it stays bad when the reason changes, but not more often than that.
+// Reports the reason with each change of health, and while health stays bad when the reason changes, but at
+// most once per kPause.
 void EventWatch::watchDoubt(const Frame& frame, EventBuffer& events) {
   if (frame.doubt == doubt_ || frame.doubt == Doubt::kSettling) return;
   constexpr Duration kPause = Duration::fromMilliseconds(1000);

@@ -9,31 +9,31 @@
 namespace swiftlet {
 namespace {
 
-// Coasting position error grows with the cube of time: after 3 s it is metres.
+// The position error of coasting grows with the cube of time: metres after 3 s.
 constexpr double kCoastLimit = 3.0;  // s
 // After a start and after a doubt: ten images at 20 Hz.
 constexpr double kSettlingTime = 0.45;  // s
 constexpr double kStampSlack = 1e-3;    // s: sums of frame intervals are exact to rounding
-// After a disagreement of what had been good: its figures fall below the limits for moments too.
+// After a disagreement in an epoch that was good, whose figures can briefly fall below the limits.
 constexpr double kReconciledTime = 2.0;  // s
-// The settling time doubles with each loss, until the estimate has been good for long.
+// The settling time doubles with each loss, until the estimate has been good for kForgivenTime.
 constexpr int kMostLosses = 4;
 constexpr double kForgivenTime = 10.0;  // s of good
-// Figures of single frames scatter: low pass.
+// Figures of single frames scatter, so they are low-pass filtered.
 constexpr double kAverageTime = 0.5;  // s
 // 3 sigma: 0.6 m/s and 6 degrees. Healthy flights stay below a third of it.
 constexpr double kVelocitySigma = 0.2;  // m/s
 constexpr double kTiltSigma = 0.035;    // rad
-// Inliers among the sightings of known landmarks; healthy flights have 87 % or more, with a person in view
-// too.
+// Smallest share of inliers among the observations of known landmarks; good flights have 87 % or more, even
+// with a person in view.
 constexpr double kFitShare = 0.75;
-// Residuals of the IMU's motion, in sigmas of its noise as in flight, times what the pixel noise was raised
-// by. Where the noise model holds they are 0.1 to 0.3, with real sensors up to 1.2.
+// IMU residuals of the motion, in sigmas of the noise in use, times the factor by which the pixel noise was
+// increased. They are 0.1 to 0.3 if the noise model holds, and up to 1.2 with real sensors.
 constexpr double kImuResidual = 2.0;
-// By which gyro or accelerometer err beyond their noise as set; with a gyro 10 times as noisy as told 5
-// to 10.
+// Largest factor on the IMU's noise as found in flight; it is 5 to 10 if the gyro's true noise is 10 times
+// the configured one.
 constexpr double kImuFactor = 20.0;
-// Far outside the limits: the estimate is useless.
+// Far outside the limits, the estimate is useless.
 constexpr double kUselessVelocitySigma = 1.0;  // m/s
 constexpr double kUselessImuResidual = 5.0;
 constexpr double kUselessShare = 0.3;
@@ -78,7 +78,8 @@ void HealthMonitor::average(const Evidence& evidence, double seconds) {
   const int fit = s.inliers_mono + s.inliers_stereo;
   if (s.known >= kMinSightings)
     share_ = lowPass(share_, std::min(1.0, fit / static_cast<double>(s.known)), seconds);
-  // Noise of tracks alone would not make the IMU's residuals larger, but weigh the tracks less against it.
+  // Track noise larger than configured does not increase the IMU's residuals, but only because it lowers the
+  // weight of tracks.
   const double disagreement = s.imu_residual * s.noise.pixel_sigma / pixel_sigma_;
   imu_square_ = lowPass(imu_square_, disagreement * disagreement, seconds);
   if (seconds > 0) {
@@ -115,7 +116,7 @@ Doubt HealthMonitor::accuracyDoubt(const Evidence& evidence) const {
   return scaleDoubt(evidence);
 }
 
-// One camera only: with two, a new start from the same data would end the same way.
+// Only with one camera: with two, a new start from the same data would have the same result.
 bool HealthMonitor::contradicted(const FrameStatistics& statistics) const {
   if (cameras_ != 1) return false;
   if (scaleOffBy(ScaleCheck::kContradicts, ScaleCheck::kContradictsSigmas, statistics)) return true;
@@ -151,7 +152,7 @@ Health HealthMonitor::update(const Evidence& evidence) {
   }
   const Doubt accuracy = accuracyDoubt(evidence);
   if (accuracy != Doubt::kNone || evidence.imu_missing || without_image > goodAge()) settled_ = 0;
-  // What coasts is not judged by figures of images, but no vehicle is faster than the limit.
+  // While coasting, image figures are not evaluated, but the speed limit of the vehicle is.
   if (accepted || evidence.state.v_world_body.norm() > max_speed_) {
     beyond_use_ = beyondUse(evidence.state) ? beyond_use_ + seconds : 0;
   }

@@ -1,13 +1,13 @@
 #pragma once
 // Health: the accuracy class of the estimate, updated after each solve.
 //
-//  initializing  until the epoch is good for the first time
+//  initializing  until the epoch is without doubt for the first time (a missing camera or few observations
+//                do not count)
 //  good          no doubt now, nor during the preceding settling time (0.45 s of accepted images, 2 s after a
 //                disagreement)
 //  degraded      a doubt; or coasting on the IMU for less than 3 s
-//  failed        no accepted image (8 observations) for 3 s; or, after the epoch was good, figures far
-//  outside
-//                the limits
+//  failed        no accepted image (8 observations) for 3 s; or, once initialized, figures far outside the
+//                limits
 // Doubt (odometry_output.hpp) lists the conditions: bounds on the sigmas of velocity and tilt, on the share
 // of inliers, on the IMU residuals relative to the noise model, on speed and acceleration, and with one
 // camera on the disagreement with the accelerometer's scale (scale_check.hpp).
@@ -30,9 +30,9 @@ namespace swiftlet {
 
 class HealthMonitor {
  public:
-  /// s without an accepted image after which health is no longer good, for cameras of 20 Hz and faster.
+  /// s without an accepted image after which health is no longer good, for cameras with 20 Hz or more.
   static constexpr double kGoodAge = 0.3;
-  /// The same for slower ones: s by which the image may come later than usual.
+  /// For slower cameras: s by which the image may be later than usual.
   static constexpr double kGoodDelay = 0.25;
   /// s without an accepted image after which a new epoch begins, unless the image shows known landmarks.
   static constexpr double kLongCoast = 1.0;
@@ -74,9 +74,10 @@ class HealthMonitor {
   [[nodiscard]] Health at(Stamp stamp) const;
   /// The same from the last health, the stamp of the last accepted image and goodAge().
   [[nodiscard]] static Health aged(Health health, Stamp last_accepted, double good_age, Stamp stamp);
-  /// s without an accepted image after which health is no longer good, by the usual interval of the images.
+  /// s without an accepted image after which health is no longer good; depends on the usual interval of the
+  /// images.
   [[nodiscard]] double goodAge() const { return std::max(kGoodAge, interval_.get().seconds() + kGoodDelay); }
-  /// Of the epoch; valid after its first update.
+  /// Stamp of the last accepted frame of the epoch; valid after its first update.
   [[nodiscard]] Stamp lastAccepted() const { return last_accepted_; }
   [[nodiscard]] double secondsWithoutImage(Stamp stamp) const;
 
@@ -98,7 +99,7 @@ class HealthMonitor {
   bool has_image_ = false;
   Stamp last_accepted_;
   std::optional<Stamp> last_;  ///< last frame of the epoch
-  UsualInterval interval_;     ///< between frames, of all epochs
+  UsualInterval interval_;     ///< between frames; kept across epochs
   Eigen::Vector3d last_velocity_ = Eigen::Vector3d::Zero();
   double settled_ = 0;       ///< s of accepted images since the last doubt
   double share_ = 1;         ///< share of a frame's observations that fit, low pass

@@ -10,13 +10,13 @@ namespace {
 constexpr double kMoved = 3e-3;      // rad
 constexpr double kLeastMoved = 0.5;  // px; noise of a median is about 0.1
 constexpr double kFlowNoise = 0.1;   // px
-// Of the line of sight.
+// Rates of the line of sight.
 constexpr double kStillRate = 0.4e-3;  // rad/s
 constexpr double kSlowRate = 5e-3;     // rad/s
-// An image that shakes while it drifts passes through where it was: not for longer than a period.
+// An image that drifts while it shakes passes its reference position, but only for less than this time.
 constexpr double kStillTime = 0.25;  // s
-// Takes shaking by rotors (above 5 Hz) to a fifteenth. The reference itself is shaken, so that what the low
-// pass gives says something only against what it gave once it had settled.
+// Reduces shaking by rotors (above 5 Hz) to a fifteenth. The reference is shaken too, so the filtered value
+// is compared with its own value after settling.
 constexpr double kLowPass = 0.5;  // s
 constexpr double kSettled = 1.0;  // s after the reference
 constexpr std::size_t kQuadrantTracks = 5;

@@ -13,7 +13,7 @@ constexpr std::size_t kKeptFrames = 64;  // the whole patience at 20 Hz, every 8
 constexpr std::size_t kMinFrames = 8;
 constexpr Duration kShortestWindow = Duration::fromMilliseconds(400);
 constexpr double kScaleSigmaWanted = 0.10;    // relative
-constexpr double kScaleSigmaAccepted = 0.50;  // once the patience is over
+constexpr double kScaleSigmaAccepted = 0.50;  // once the patience has passed
 constexpr int kMinSightings = 3;
 
 }  // namespace
@@ -66,7 +66,7 @@ std::size_t MonoStarter::gatherTracks(std::span<const std::size_t> chosen, const
     for (const TrackedFeature& feature : frame(chosen[k]).features) {
       Eigen::Vector3d bearing;
       if (!feature.seen[0] || !rig_.camera[0].unproject(feature.pixel[0].cast<double>(), bearing)) continue;
-      // While the velocity is steady it moves the places of all frames alike.
+      // Only rotation is corrected: a steady velocity shifts the positions of all frames equally.
       if (rig_.rolls())
         bearing = scan.turnAt(rig_.rowTime(0, static_cast<double>(feature.pixel[0].y()))) * bearing;
       const auto end = track_ids_.begin() + static_cast<std::ptrdiff_t>(count);

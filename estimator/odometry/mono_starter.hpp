@@ -1,12 +1,12 @@
 #pragma once
 // The start with one camera: keeps frames until velocity, tilt and scale can be solved.
 //
-// One camera does not observe scale until the body accelerates, so the first frames wait here, at most
-// `kMonoPatience`. They are then given to the smoother one after the other from the solved first state, as if
-// they had just arrived. At rest the velocity is known, and no frame has to wait.
-// Memory: 64 frames, 0.9 MiB, reserved by the constructor. If they are full before the patience is over,
-// every second one goes, but no keyframe, and of the later frames every second one is kept: the frames span
-// the whole wait at any frame rate. Cost: one solve of mono_start.hpp per kept frame while waiting.
+// With one camera, scale is not observable until the body accelerates, so the first frames wait here, at most
+// `kMonoPatience`. They are then passed to the smoother one after the other from the solved first state, as
+// if they had just arrived. At rest the velocity is known, and no frame has to wait. Memory: 64 frames, 0.9
+// MiB, reserved by the constructor. If they are full before the patience has passed, every second frame is
+// dropped (keyframes are kept), and of later frames only every second one is kept, so the frames span the
+// whole wait at any frame rate. Cost: one solve of mono_start.hpp per kept frame while waiting.
 
 #include <Eigen/Core>
 #include <vector>
@@ -21,7 +21,7 @@
 
 namespace swiftlet {
 
-/// Longest wait for a certain scale; then the best estimate is used.
+/// Longest wait for an accurate scale; then the best estimate is used.
 inline constexpr Duration kMonoPatience = Duration::fromMilliseconds(2600);
 
 class MonoStarter {
@@ -31,7 +31,7 @@ class MonoStarter {
   void reset();
   void setNoise(const ImuNoise& noise) { noise_ = noise; }
 
-  /// Keeps a frame, unless it lies between those kept of a fast camera. Drops the oldest if full.
+  /// Keeps a frame, unless it is skipped because of a high frame rate. Drops the oldest if full.
   void push(const TrackedFrame& frame);
 
   [[nodiscard]] std::size_t size() const { return count_; }
@@ -40,10 +40,10 @@ class MonoStarter {
     return frames_[(begin_ + k) % frames_.size()];
   }
 
-  /// Solves from the kept frames, without samples before `earliest`, with the calibration as estimated so
-  /// far. Call after each push. True if the scale is known well enough
-  /// or kMonoPatience is over since the first frame after reset(); `start` is then the state at the oldest.
-  /// Otherwise `waiting_for` tells what is missing.
+  /// Solves with the kept frames and the calibration as estimated so far, without samples before `earliest`.
+  /// Call after each push. True if the scale is accurate enough or kMonoPatience has passed since the first
+  /// frame after reset(); `start` is then the state at the oldest kept frame. Otherwise `waiting_for` tells
+  /// what is missing.
   bool trySolve(const ImuBuffer& imu, Stamp earliest, const StartPrior& prior,
                 const CalibrationEstimate& calibration, double pixel_sigma, StartState& start,
                 const char*& waiting_for);

@@ -38,7 +38,7 @@ class Odometry::Impl {
   }
 
  private:
-  /// The newest state goes to propagation, the newest window to tracking.
+  /// Passes the newest state to propagation and the newest window to tracking.
   void feedBack() {
     smooth_.fix(fix_);
     propagation_.take(fix_);

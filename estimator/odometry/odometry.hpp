@@ -1,10 +1,10 @@
 #pragma once
 // The odometry: front-end, IMU and smoother with health, for programs with one thread.
 //
-// Two steps per frame: `track` (images to tracks) and `smooth` (tracks and IMU to states). IMU samples are
-// added as they arrive, each before the first frame that is not earlier on the IMU's clock (its stamp
-// and Rig::sampleLead). No clock, no files, no threads. Memory: about 24 MiB at 752 x 480 stereo, reserved by
-// the constructor; no allocation afterwards. Frames: T_world_body; world is gravity-aligned with z up, with
+// Two steps per frame: `track` (images to tracks) and `smooth` (tracks and IMU to states). Add IMU samples as
+// they arrive, each before the first frame that is not earlier on the IMU's clock (its stamp and
+// Rig::sampleLead). No clock, no files, no threads. Memory: about 24 MiB at 752 x 480 stereo, reserved by the
+// constructor; no allocation afterwards. Frames: T_world_body; world is gravity-aligned with z up, with
 // origin and yaw of the epoch's first state. Stamps: frames have the image clock, propagated states the IMU's
 // clock. Rules of start, health, events and reset: docs/odometry.md.
 
@@ -41,10 +41,10 @@ class Odometry {
   /// (`output.waiting_for`). kFailed if the window could not be solved; it was then reset.
   Status smooth(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output);
 
-  /// The keyframes still in the window, at the end of a run.
+  /// Outputs the keyframes still in the window; call at the end of a run.
   void finish(OdometryOutput& output);
 
-  /// Discards the state and starts a new epoch, in flight too.
+  /// Discards the state and starts a new epoch; also allowed in flight.
   void reset();
 
  private:

@@ -15,13 +15,13 @@ namespace swiftlet {
 /// Samples that a stage keeps before and between frames: 20 s at 200 Hz.
 inline constexpr std::size_t kImuHistory = 4096;
 
-/// Beyond the calibrated shift, where the settings have it estimated.
+/// How far the time shift can exceed its calibrated value if the settings enable its estimation.
 inline Duration shiftMargin(const OdometrySettings& settings) {
   constexpr double kSigmas = 3.0;
   return Duration::fromSeconds(settings.estimate_time_offset ? kSigmas * kTimeOffsetPriorSigma : 0.0);
 }
 
-/// The rig with the cameras selected by the settings, and with what they estimate.
+/// The rig with the cameras selected by the settings and the margins for what they estimate.
 inline Rig rigInUse(Rig rig, const OdometrySettings& settings) {
   if (!settings.use_stereo) rig.camera_count = std::min<std::size_t>(rig.camera_count, 1);
   rig.shift_margin = shiftMargin(settings);

@@ -1,5 +1,5 @@
 #pragma once
-// The settings that a user may need; all other numbers are named constants with their reasons.
+// Settings that users may need; all other numbers are named constants with their reasons.
 
 #include "estimator/messages/track_noise.hpp"
 

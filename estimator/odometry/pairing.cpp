@@ -82,7 +82,8 @@ void Pairing::restart() {
   missing_running_ = {};
 }
 
-/// Only images from when there was no IMU to go by can be so far ahead of it.
+/// Forgets what is stamped far later than `frame`: such images can only be from before there was an IMU to
+/// check them.
 void Pairing::forgetAheadOf(const CameraFrame& frame) {
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
     if (any_seen_[c] && isFarAhead(frame.stamp, last_seen_[c])) any_seen_[c] = false;
@@ -108,12 +109,12 @@ Status Pairing::push(const CameraFrame& frame, StereoFrame& paired) {
   const Duration tolerance = toleranceFor(frame);
   any_seen_[camera] = true;
   last_seen_[camera] = frame.stamp;
-  // Whatever happens to this frame, its camera is alive again.
+  // Even if this frame is refused, its camera is working again.
   const bool came_back = isLost(camera);
   missing_running_[camera] = 0;
 
   now_ = frame.stamp;
-  // A late partner of what went out is as useless as a reversed stamp.
+  // A partner that arrives after its pair was output is refused like a reversed stamp.
   if (settings_.cameras > 1 && any_given_ &&
       frame.stamp <= last_given_ + (came_back ? settings_.tolerance : tolerance)) {
     return refuse(camera, "frame arrived after its pair was processed");

@@ -1,15 +1,15 @@
 #pragma once
 // Joins the frames of two cameras of the same instant into one StereoFrame.
 //
-// Frames are added one by one in the order of arrival, and go out in the order of their stamps. Each call
-// outputs at most one pair or single frame; `expire` is called until it has none. Rules, each counted:
+// Frames are added one by one in the order of arrival and output in the order of their stamps. Each call
+// outputs at most one pair or single frame; call `expire` until it returns kNotReady. Rules, each counted:
 //  - Two frames of different cameras pair if their stamps differ by at most the tolerance, or by a quarter of
 //    the camera's frame interval if that is less, so that pairs are unambiguous. The pair has the stamp of
 //    camera 0.
 //  - A frame without partner is output alone when a later frame of the other camera shows that the partner is
 //    missing, when `patience` has passed on the stamps of later messages, or when kPairingFrames wait behind
-//    it. A later frame of the same camera shows nothing: the other camera's may take longer than a frame
-//    interval.
+//    it. A later frame of the same camera shows nothing, because the other camera's may take longer than a
+//    frame interval.
 //  - A camera that misses kLostAfter consecutive frames counts as lost. Frames of the other camera are then
 //    output at once. The first frame of the lost camera restores the waiting.
 //  - A frame not later than the last output is refused: repeated, reversed, or too late. If it is earlier by
@@ -31,8 +31,8 @@
 
 namespace swiftlet {
 
-/// Frames that wait at most. The other camera's may arrive less than this many intervals later: 20 ms at 200
-/// Hz.
+/// Largest number of waiting frames. The other camera's frame may arrive less than this many intervals later:
+/// 20 ms at 200 Hz.
 inline constexpr std::size_t kPairingFrames = 4;
 
 struct PairingSettings {

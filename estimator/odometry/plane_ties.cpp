@@ -6,28 +6,30 @@
 namespace swiftlet {
 namespace {
 
-// How far walls lean and floors slope, and what is left of the tilt's error in a plane's fit.
+// Standard deviation of a plane's direction: how much real walls lean and floors slope, and the remaining
+// tilt error in a plane's fit.
 constexpr double kDirectionSigma = 0.015;  // rad
-// Three points make a plane; with fewer than this a single wrong one turns it.
+// Three points define a plane, but with fewer than this a single wrong point turns it.
 constexpr std::size_t kFewestPoints = 5;
-// Columns cost their cube: what the states gain beyond this is below what a flight's seeds differ by.
+// Solve time grows with the cube of the number of columns. More ties improve the states by less than the
+// variation between flights.
 constexpr std::size_t kMostTies = 48;
-constexpr int kFewestSightings = 4;  // states of the window: the depth is more than one stereo pair's
-// A point tied beside another tells little more.
+constexpr int kFewestSightings = 4;  // states of the window: more than the depth of one stereo pair
+// A point close to a tied one adds little information.
 constexpr double kApart = 0.25;           // m
-constexpr double kMaxResidual = 0.05;     // m, whatever the sigmas say: the mesher's gate
-constexpr double kMaxNormalSigma = 0.05;  // m: a point known worse is on any plane
+constexpr double kMaxResidual = 0.05;     // m, independent of the sigmas: the mesher's gate
+constexpr double kMaxNormalSigma = 0.05;  // m: a point with a larger sigma would fit any plane
 constexpr double kChiSquared = 6.63;      // 99 % of one degree of freedom
-// A plane that counts in the solve is known better (kMaxNormalSigma of extra_table.cpp, in both
-// directions).
+// A plane is tested against only if its direction is more accurate than this (both directions together);
+// compare kMaxNormalSigma in extra_table.cpp.
 constexpr double kSettledSigma = 0.1;  // rad
-// Ties are tested at every frame: what fails here is not one in a hundred of a day's.
+// Ties are tested in every frame, so the threshold must be rarely exceeded by chance.
 constexpr double kAfterSigmas = 3.5;
-constexpr int kUnnamedReports = 3;   // the mesh changes, the landmark does not
-constexpr int kRefusedReports = 20;  // some five seconds, after which the point is known better
+constexpr int kUnnamedReports = 3;   // reports: the mesh changes although the landmark does not
+constexpr int kRefusedReports = 20;  // reports, about five seconds, after which the point is known better
 
-// The plane's, at a point. A plane's covariance is in the world, with the drift of the whole window in it,
-// which its points share; between them and the plane there is less than this.
+// Limits the sigma of a plane at a point. A plane's covariance is relative to the world and includes the
+// drift of the whole window, which its points share; relative to its points the plane is more accurate.
 constexpr double kMaxPlaneSigma = 0.02;  // m
 
 double variance(const WindowPlane& plane, const Eigen::Vector3d& p) {
@@ -35,9 +37,9 @@ double variance(const WindowPlane& plane, const Eigen::Vector3d& p) {
   return std::clamp(q.dot(plane.covariance * q), 0.0, kMaxPlaneSigma * kMaxPlaneSigma);
 }
 
-// The solve balances the tie against the sightings: with `own` the variance that these leave along the normal
-// and t^2 the tie's, a point that they put at height h is held at h t^2 / (own + t^2). So h is known from the
-// height after the solve, and is what is tested, against own + t^2.
+// The solve balances the tie against the observations. With `own` the variance along the normal from the
+// observations and t^2 that of the tie, a point that the observations put at height h ends at h t^2 / (own +
+// t^2). So h follows from the height after the solve and is tested against own + t^2.
 bool disagrees(double height_after, double own_sigma, double tie_sigma) {
   const double own = own_sigma * own_sigma;
   const double tie = tie_sigma * tie_sigma;
@@ -113,14 +115,14 @@ void PlaneTies::apply(Smoother& smoother, const TrackedFrame& coming, std::uint3
   collectCandidates(coming);
   addPlanes(smoother);
   if (held_.empty()) return;
-  // First apart from each other and a fair share each, then what room is left.
+  // First points that are apart, with an equal share for each plane; then more, while there is room.
   const std::size_t share = std::max(kFewestPoints, kMostTies / held_.size());
   tieCandidates(smoother, share, kApart);
   tieCandidates(smoother, kMostTies, kApart);
   tieCandidates(smoother, kMostTies, 0);
 }
 
-// The mesher has the last word on who is on a plane, but not at once.
+// Unties points that the mesher no longer reports on the plane, but only after some reports.
 void PlaneTies::releaseUnnamed(Smoother& smoother) {
   for (Tie& tie : ties_) ++tie.unnamed;
   for (const ReportedPoint& point : report_.points) {
@@ -137,7 +139,7 @@ void PlaneTies::releaseUnnamed(Smoother& smoother) {
 void PlaneTies::collectCandidates(const TrackedFrame& coming) {
   candidates_.clear();
   for (const ReportedPoint& point : report_.points) {
-    if (!point.firm) break;  // they come last
+    if (!point.firm) break;  // firm points come first
     const auto same = [&point](const auto& other) { return other.id == point.id; };
     if (std::any_of(ties_.begin(), ties_.end(), same) || refused(point.id, point.plane)) continue;
     const auto plane = std::find_if(report_.planes.begin(), report_.planes.end(),
@@ -227,7 +229,7 @@ void PlaneTies::review(Smoother& smoother) {
   for (std::size_t k = held_.size(); k-- > 0;) {
     HeldPlane& plane = held_[k];
     const std::optional<PlaneEstimate> estimate = smoother.plane(plane.id);
-    if (!estimate) {  // it has left with its last point
+    if (!estimate) {  // it left the window with its last point
       dropPlane(k);
       continue;
     }
@@ -246,7 +248,7 @@ void PlaneTies::review(Smoother& smoother) {
     HeldPlane* plane = held(tie.plane);
     const WindowLandmark* known = landmark(tie.id);
     if (plane == nullptr || known == nullptr || !smoother.promoted(tie.id)) {
-      if (plane != nullptr) --plane->ties;  // the landmark has left
+      if (plane != nullptr) --plane->ties;  // the landmark left the window
       ties_.erase(t);
       continue;
     }

@@ -1,15 +1,15 @@
 #pragma once
 // Ties landmarks to the planes that the mesher found: keeps the smoother's planes in step with its reports.
 //
-// A report is applied before the next step. Planes are added with their direction, and some of the points on
-// them are promoted and tied: points that the next frame sees, that several states observed, and that pass a
-// chi-squared test against the smoother's plane. Best known points come first, apart from each other and
-// spread over the planes. After each solve ties that disagree are removed. A tied point is pulled onto its
-// plane, so the test compares its remaining distance with what its own observations allow (disagrees() in
-// plane_ties.cpp). A refused point is not tried again on the same plane for some time. Work is bounded by
-// kMaxPlanes and kMaxLandmarks; no allocation; reports of another epoch are ignored. Memory: 0.15 MiB inside
-// the object. Cost: that of the additional columns; with 40 ties a step takes 2.0 ms instead of 1.3 ms
-// (tests/odometry/plane_statistics.cpp). Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
+// A report is applied before the next step. Planes are added with their direction, and some of their points
+// are promoted and tied: points that the next frame sees, that several states observed, and that pass a
+// chi-squared test against the smoother's plane. The most accurate points come first, apart from each other
+// and distributed over the planes. After each solve, ties that disagree are removed. A tied point is pulled
+// onto its plane, so the test compares its remaining distance with what its own observations allow
+// (disagrees() in plane_ties.cpp). A refused point is not tried again on the same plane for some time. Work
+// is bounded by kMaxPlanes and kMaxLandmarks; no allocation; reports of another epoch are ignored. Memory:
+// 0.15 MiB inside the object. Cost: that of the additional columns; with 40 ties a step takes 2.0 ms instead
+// of 1.3 ms (tests/odometry/plane_statistics.cpp). Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental
 // Visual-Inertial 3D Mesh Generation with Structural Regularities", ICRA 2019; the tests are this project's
 // own.
 
@@ -30,7 +30,7 @@ struct PlaneTieCounters {
   std::uint64_t reports = 0;          ///< applied
   std::uint64_t reports_ignored = 0;  ///< of another epoch, or not newer than the last
   std::uint64_t planes_added = 0;
-  std::uint64_t planes_refused = 0;  ///< for lack of room
+  std::uint64_t planes_refused = 0;  ///< because there was no room
   std::uint64_t points_tied = 0;
   std::uint64_t points_refused = 0;  ///< by the test before tying
   std::uint64_t points_untied = 0;   ///< by the test after a solve, or because the mesher dropped them
@@ -38,19 +38,20 @@ struct PlaneTieCounters {
 
 class PlaneTies {
  public:
-  /// m, standard deviation of a point's distance from its plane.
+  /// `point_sigma`: m, standard deviation of a point's distance from its plane.
   explicit PlaneTies(double point_sigma) : point_sigma_(point_sigma) {}
 
-  /// The newest report replaces one that waits.
+  /// Stores a report for apply(); replaces one that was not applied yet.
   void take(const PlaneReport& report);
-  /// Applies the waiting report, before the smoother's next step with its frame.
+  /// Applies the stored report. Call before the smoother's step with the frame `coming`.
   void apply(Smoother& smoother, const TrackedFrame& coming, std::uint32_t epoch);
-  /// After the smoother's trim: removes ties that disagree with the solve and those that left the window.
+  /// Call after the smoother's trim: removes ties that disagree with the solve and those that left the
+  /// window.
   void review(Smoother& smoother);
-  /// The smoother has been reset.
+  /// Call when the smoother was reset.
   void reset();
 
-  /// State after the last review.
+  /// Planes after the last review().
   [[nodiscard]] const FixedVector<WindowPlane, kMaxPlanes>& planes() const { return estimates_; }
   [[nodiscard]] std::size_t size() const { return ties_.size(); }
   /// The reported plane that a landmark is tied to; 0: none.

@@ -27,7 +27,7 @@ void PropagationStage::take(const StateFix& fix) {
   if (fix.state.epoch != fix_.state.epoch) propagator_.forgetState();
   fix_ = fix;
   propagator_.setNoise(monitor_.noise().times(fix.imu));
-  // A state that is not finite never leaves the smoother; a bridged hole is in the covariance.
+  // The status needs no check: the smoother's states are finite, and a gap is already in the covariance.
   if (fix.has_state) static_cast<void>(propagator_.setState(fix.state, fix.gyro));
 }
 

@@ -1,10 +1,10 @@
 #pragma once
 // The stage of the thread `propagate`: a state for every IMU sample at once, propagated from the newest fix.
 //
-// A fix is some frames old when it arrives. The samples since its stamp are applied to it again, so that the
-// output jumps only by the correction. A fix of a new epoch replaces everything before.
-// Frames, units: those of NavState. Stamps: of the sample. Memory: 1024 samples, 60 kB, no allocation.
-// Cost: some 2 us per sample; a fix costs that for each sample since its stamp.
+// A fix is some frames old when it arrives. The samples since its stamp are re-applied to it, so the output
+// jumps only by the correction. A fix of a new epoch replaces everything before. Frames, units: those of
+// NavState. Stamps: those of the samples. Memory: 1024 samples, 60 kB, no allocation. Cost: about 2 us per
+// sample; a fix costs that for each sample since its stamp.
 
 #include "estimator/core/status.hpp"
 #include "estimator/imu/propagation.hpp"
@@ -25,7 +25,7 @@ class PropagationStage {
   /// stamp repeated or reversed). `state` may be null.
   Status step(const ImuSample& sample, NavState* state);
 
-  /// A fix of another time line is ignored.
+  /// Takes a fix; ignored if it is of another time line.
   void take(const StateFix& fix);
 
   /// Call if the IMU's stamps went back permanently (stamp_guard.hpp): forgets everything before. There is no
@@ -36,7 +36,7 @@ class PropagationStage {
   SampleMonitor monitor_;
   Propagator propagator_;
   std::uint32_t timeline_ = 0;
-  StateFix fix_;  // the newest; every state has its epoch and health
+  StateFix fix_;  // the newest; gives every state its epoch and health
 };
 
 }  // namespace swiftlet

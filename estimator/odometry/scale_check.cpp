@@ -6,20 +6,21 @@
 namespace swiftlet {
 namespace {
 
-// What is known before the first keyframe.
-constexpr double kVelocitySigma = 5.0;    // m/s, about the estimate's times the scale
+// Prior before the first keyframe.
+constexpr double kVelocitySigma = 5.0;    // m/s, around the estimated velocity times the scale
 constexpr double kScaleSigma = 1.0;       // relative
-constexpr double kTiltSigma = 0.1;        // rad: a start in motion may be off by 6 degrees
+constexpr double kTiltSigma = 0.1;        // rad: a start in motion can be off by 6 degrees
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2
 // Random walk of the scale error: 6 % in 10 s.
 constexpr double kScaleWalk = 0.02;  // 1/sqrt(s)
 constexpr double kTiltWalk = 1e-3;   // rad/sqrt(s)
-// A start's evidence is void when the smoother has corrected its scale by more than this since.
+// Before the scale is confirmed, evidence is discarded if the smoother has since corrected its scale by more
+// than this (natural logarithm).
 constexpr double kCorrected = 0.10;
-// Keyframes closer together than this do not show a correction of the scale.
+// Keyframes closer together than this do not reveal a correction of the scale.
 constexpr double kLeastDistance = 0.2;  // m
-// Beside the smoother's own factor for errors that last (track_correlation.hpp): the limits for a restart
-// were found with both.
+// In addition to the smoother's factor for correlated errors (track_correlation.hpp). The limits for a
+// restart were tuned with both.
 constexpr double kVisionInflation = 4.0;  // on the variance
 
 }  // namespace
@@ -41,7 +42,7 @@ void ScaleCheck::forget() {
   corrected_ = 1;
 }
 
-// About zero it would take a fast vehicle's path for a long one.
+// A prior around zero velocity would explain the path of a fast vehicle by a larger scale.
 void ScaleCheck::forgetVelocity(const WindowState& state) {
   const Eigen::Vector3d v = state.has_motion ? state.x.v_world_body : Eigen::Vector3d::Zero();
   x_.segment<3>(kVelocity) = scale() * v;
@@ -65,7 +66,7 @@ void ScaleCheck::update(Smoother& smoother) {
   newest_ = j.frame_index;
   if (!confirmed_) watchCorrections(window, settled);
   if (!follows || j.link != LinkKind::kImu || !i.has_motion || !j.has_motion) {
-    // No IMU link from the last keyframe taken: its velocity is unknown here.
+    // No IMU link from the last keyframe used: the velocity is unknown here.
     forgetVelocity(j);
     if (!follows) return;
   }
@@ -80,7 +81,7 @@ void ScaleCheck::update(Smoother& smoother) {
   confirmed_ = confirmed_ || (sigma() < kKnown && std::abs(scale() - 1) < kAgrees);
 }
 
-// Displacements before and after a correction of the scale cannot be compared.
+// Displacements before and after a correction of the scale are not comparable.
 void ScaleCheck::watchCorrections(const Window& window, std::size_t settled) {
   const auto find = [&](std::uint64_t frame) {
     std::size_t k = 0;
@@ -99,7 +100,7 @@ void ScaleCheck::watchCorrections(const Window& window, std::size_t settled) {
       forgetVelocity(window[settled - 2]);
     }
   }
-  // The oldest keyframe may leave before the next call.
+  // Not the oldest keyframe, which can leave the window before the next call.
   const WindowState& first = window[1];
   const WindowState& last = window[settled - 1];
   const double distance = (last.x.T_world_body.translation - first.x.T_world_body.translation).norm();
@@ -107,7 +108,7 @@ void ScaleCheck::watchCorrections(const Window& window, std::size_t settled) {
   if (distance > kLeastDistance) old_ = Baseline{first.frame_index, last.frame_index, distance};
 }
 
-// To the instant of the next keyframe; `kMoved` becomes the displacement since.
+// Propagates to the next keyframe; `kMoved` becomes the displacement since the last one.
 void ScaleCheck::propagate(const WindowState& i, const Preintegration& imu) {
   const double t = imu.duration();
   const Eigen::Matrix3d R = i.x.T_world_body.R();

@@ -24,13 +24,13 @@ namespace swiftlet {
 
 class ScaleCheck {
  public:
-  /// The scale counts as known below this relative sigma.
+  /// The scale counts as known if its relative sigma is below this.
   static constexpr double kKnown = 0.08;
-  /// The scale agrees if |s - 1| is below this plus so many sigmas.
+  /// The scale agrees if |s - 1| is below this plus this many sigmas.
   static constexpr double kAgrees = 0.10;
   static constexpr double kAgreesSigmas = 2;
-  /// The estimate must be restarted if |s - 1| is above this plus so many sigmas: a right one that is thrown
-  /// away is worse than one that is doubted.
+  /// The estimate must be restarted if |s - 1| is above this plus this many sigmas. Discarding a correct
+  /// estimate is worse than doubting it, so these limits are wider.
   static constexpr double kContradicts = 0.15;
   static constexpr double kContradictsSigmas = 3;
 
@@ -38,13 +38,13 @@ class ScaleCheck {
 
   /// Starts a new epoch without evidence.
   void reset();
-  /// After a step's trim: uses the newest keyframe that stays, once.
+  /// Call after a step's trim: uses the newest keyframe that stays, once.
   void update(Smoother& smoother);
 
   /// True over estimated length.
   [[nodiscard]] double scale() const { return x_[kScale]; }
   [[nodiscard]] double sigma() const;
-  /// Whether the scale was known and agreed once since reset(); this remains so without further acceleration.
+  /// Whether the scale was known and agreed once since reset(). Stays true without further acceleration.
   [[nodiscard]] bool confirmed() const { return confirmed_; }
 
  private:
@@ -53,7 +53,7 @@ class ScaleCheck {
   using Matrix = Eigen::Matrix<double, kAll, kAll>;
 
   void forget();
-  /// The velocity becomes that of the estimate times the scale, with a large sigma.
+  /// Sets the velocity to the estimate's times the scale, with a large sigma.
   void forgetVelocity(const WindowState& state);
   void watchCorrections(const Window& window, std::size_t settled);
   void propagate(const WindowState& i, const Preintegration& imu);
@@ -64,13 +64,13 @@ class ScaleCheck {
   Matrix P_ = Matrix::Zero();
   bool any_ = false;
   bool confirmed_ = false;
-  double corrected_ = 1;  // the smoother's factor on its scale since the start of the evidence
+  double corrected_ = 1;  // the smoother's change of its scale since the evidence began, as a factor
   struct Baseline {
     std::uint64_t first;
     std::uint64_t last;
     double distance;
   };
-  std::optional<Baseline> old_;  // between two keyframes of the window, at the last call
+  std::optional<Baseline> old_;  // between two keyframes of the window at the last call
   std::uint64_t newest_ = 0;     // frame of the last keyframe used
 };
 

@@ -7,20 +7,21 @@
 namespace swiftlet {
 namespace {
 
-// The first second's frames decide tilt, velocity and biases: they get more iterations than the steady state.
+// The frames of the first second determine tilt, velocity and biases, so they get more iterations.
 constexpr double kStartTime = 1.0;    // s
-constexpr double kStampSlack = 1e-3;  // s: stamps of frames a period apart are so to rounding
+constexpr double kStampSlack = 1e-3;  // s, rounding of the stamps of periodic frames
 constexpr int kStartIterations = 8;
-// Of good health before the gyro's matrix is estimated: a start that is wrong would take its errors for the
-// gyro's.
+// [s] of good health before the gyro's matrix is estimated: after a wrong start its errors would be
+// attributed to the gyro.
 constexpr double kTrustedTime = 2.0;  // s
-// What a flying body may be doing at its first image, in each axis.
+// Possible motion and biases of a body at its first image, per axis.
 constexpr double kStartVelocitySigma = 2.0;    // m/s
 constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
-// So long the accelerometer carries the speed on from a rest, to a few cm/s.
+// For this long after a rest the accelerometer gives the speed to a few cm/s.
 constexpr double kRestRemembered = 2;  // s
-constexpr double kCarriedBias = 2.0;   // times the sigma with which it was left: marginals are hopeful
+constexpr double kCarriedBias = 2.0;   // factor on the sigma at the end of the last epoch: marginal
+                                       // covariances are optimistic
 
 SmootherSettings smootherSettings(const OdometrySettings& settings) {
   SmootherSettings s;
@@ -72,7 +73,7 @@ void SmoothStage::addImu(const ImuSample& sample) {
 }
 
 Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, OdometryOutput& output) {
-  trim();  // where the caller left it out
+  trim();  // if the caller omitted it
   output.has_state = false;
   output.waiting_for = "";
   if (tracked.timeline != timeline_) {
@@ -95,7 +96,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
     blind = 0;
   }
   if (health_.lost()) giveUp();
-  // A start does not reach across missing samples: it begins anew with this frame.
+  // A start must not span missing samples: it begins again with this frame.
   if (imu_gap) mono_starter_.reset();
   if (!smoother_.started() && !start(tracked, output)) {
     imu_gap_ = false;
@@ -122,8 +123,7 @@ Status SmoothStage::step(const TrackedFrame& tracked, const Effort& effort, Odom
   if (status.ok()) {
     trim_due_ = true;
     const FrameStatistics& figures = smoother_.statistics();
-    // Landmarks of before that are found again tie the image to the past, if not a few; new ones have no say
-    // yet.
+    // Enough known landmarks found again tie the image to the past; new landmarks do not count yet.
     const bool recognizes = figures.inliers_mono + figures.inliers_stereo >= HealthMonitor::kNominalSightings;
     if (blind > HealthMonitor::kLongCoast && sees && !recognizes) {
       watch_.watchBlackout(tracked.stamp, blind, events_);
@@ -158,7 +158,7 @@ void SmoothStage::finish(OdometryOutput& output) {
 
 void SmoothStage::reset() {
   endEpoch();
-  // Of another world.
+  // They belong to the previous world.
   last_good_.reset();
   last_useful_.reset();
 }
@@ -192,7 +192,7 @@ void SmoothStage::restart(std::uint32_t timeline, Stamp first) {
   watch_.watchBlackout(last_stamp_, 0, events_);
   timeline_ = timeline;
   last_stamp_ = first;
-  // One a sample, they would leave no room for what follows.
+  // One event per sample would leave no room for others.
   events_.merge(EventKind::kImuInvalid);
   events_.raise(first, EventKind::kStampsWentBack, back);
   reset();
@@ -230,13 +230,13 @@ void SmoothStage::link(const SmoothedWindow& window, KeyframeLink& out) {
   out.previous = window.poses[before].frame_index;
   out.T_previous_this = window.poses[before].T_world_body.inverse() * window.poses[newest].T_world_body;
   out.linked = smoother_.relativeCovariance(before, newest, out.covariance);
-  // The smoother's is of the position in the axes of the keyframe before.
+  // The smoother's covariance is of the position in the axes of the previous keyframe.
   Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Identity();
   turn.bottomRightCorner<3, 3>() = out.T_previous_this.R().transpose();
   out.covariance = turn * out.covariance * turn.transpose();
 }
 
-/// Keyframes that left, for the next output.
+/// Stores keyframes that left the window for the next output.
 void SmoothStage::handOver() {
   for (KeyframeState keyframe : left_step_) {
     keyframe.state.epoch = epoch_;
@@ -251,7 +251,7 @@ void SmoothStage::deliver(OdometryOutput& output) {
   events_.flush(output);
 }
 
-/// The first state of an epoch. False while it must wait; the output says for what.
+/// Determines the first state of an epoch. False while it must wait; the output says for what.
 bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   const Stamp stamp = tracked.stamp + smoother_.timeOffset();
   StartPrior prior;
@@ -293,7 +293,7 @@ bool SmoothStage::start(const TrackedFrame& tracked, OdometryOutput& output) {
   return true;
 }
 
-/// Ends the epoch; the next one goes on from there.
+/// Ends the epoch; the next one continues from `at`.
 void SmoothStage::leave(const StartState& at) {
   endEpoch();
   left_at_ = at;
@@ -305,11 +305,11 @@ void SmoothStage::giveUp() {
   StartState at = newestAsStart();
   const bool failed = health_.health() == Health::kFailed && last_good_;
   if (const auto& place = failed ? last_good_ : last_useful_) at.state.T_world_body = *place;
-  at.gyro_bias_sigma = 0;  // not to be carried on
+  at.gyro_bias_sigma = 0;  // do not carry biases over
   leave(at);
 }
 
-/// Turns and moves a start to a place and heading; its tilt, and its velocity in body axes, stay.
+/// Rotates and moves a start to a position and heading; its tilt, and its velocity in body axes, stay.
 void SmoothStage::goOnFrom(const SE3& place, BodyState& state) {
   const Eigen::Quaterniond start = state.T_world_body.rotation;
   const Eigen::Vector3d up = start.conjugate() * Eigen::Vector3d::UnitZ();
@@ -335,9 +335,9 @@ StartState SmoothStage::newestAsStart() const {
   return start;
 }
 
-/// After a step that ended a long coast: the state is what the IMU alone gave, off by decimetres, and in one
-/// window with what was before it every later correction of tilt and bias would move it again. It becomes
-/// the first of a new epoch instead, known as well as the step says.
+/// Call after a step that ended a long coast. The state is the result of the IMU alone, with an error of
+/// decimetres, and while it shares a window with earlier states every correction of tilt and bias would move
+/// it again. It therefore becomes the first state of a new epoch, with the covariance of this step.
 Status SmoothStage::restartFromCoast(const Smoother::StepInput& input) {
   const StartState start = newestAsStart();
   const bool keyframe = smoother_.newest().keyframe;
@@ -350,7 +350,7 @@ Status SmoothStage::restartFromCoast(const Smoother::StepInput& input) {
   return status;
 }
 
-/// Gives the smoother the frames that waited for the start, all but the newest.
+/// Processes the frames that waited for the start, all but the newest.
 Status SmoothStage::catchUp() {
   Smoother::StepInput input;
   input.estimate_gyro = false;
@@ -367,7 +367,7 @@ Status SmoothStage::catchUp() {
   return okStatus();
 }
 
-/// There is no solution. The next epoch goes on where the estimate was last of use; nothing else is kept.
+/// The window could not be solved. The next epoch continues from the last useful pose; nothing else is kept.
 Status SmoothStage::fail(const Status& status, OdometryOutput& output) {
   if (last_useful_) {
     StartState at;
@@ -418,7 +418,8 @@ void SmoothStage::publish(const TrackedFrame& tracked, bool imu_missing, Odometr
   fix_.last_accepted = health_.lastAccepted() + smoother_.timeOffset();
   if (!starting(tracked.stamp)) {
     if (rest_.state().at_rest) last_rest_ = tracked.stamp;
-    // One camera that has hardly moved takes the first guess of the distances for a measurement.
+    // With one camera that has hardly moved, the initial guess of distances looks like a measurement, so the
+    // speed's sigma cannot be trusted.
     const bool speed_known = rig_.camera_count > 1 || scale_.confirmed() ||
                              (last_rest_ && (tracked.stamp - *last_rest_).seconds() < kRestRemembered);
     const Matrix15d& P = state.covariance;

@@ -2,11 +2,10 @@
 // The stage of the thread `smooth`: tracks and IMU to states, with start, health and events.
 //
 // A step has two parts: `step` outputs the state as early as possible; `trim` then makes room in the window
-// (marginalization). Read the fix for propagation after `step`, and the window for tracking after `trim`.
-// Add samples before the first frame that is not earlier on the IMU's clock (Rig::sampleLead). Memory:
-// 16.6 MiB, of these 0.9 MiB of waiting frames (one camera) and half a MiB of samples, the rest the
-// smoother's; no allocation after the constructor. Rules of start, health, events and reset:
-// docs/odometry.md.
+// (marginalization). Read the fix for propagation after `step`, and the window for tracking after `trim`. Add
+// samples before the first frame that is not earlier on the IMU's clock (Rig::sampleLead). Memory: 16.6 MiB,
+// of which 0.9 MiB are waiting frames (one camera) and half a MiB samples; the rest is the smoother's. No
+// allocation after the constructor. Rules of start, health, events and reset: docs/odometry.md.
 
 #include <optional>
 
@@ -43,7 +42,7 @@ class SmoothStage {
 
   void addImu(const ImuSample& sample);
 
-  /// Planes of the mesher, applied at the beginning of the next step. Without effect unless
+  /// Takes planes of the mesher, applied at the beginning of the next step. No effect unless
   /// `regularity_enabled`. Reports of another epoch are ignored.
   void take(const PlaneReport& report);
 
@@ -58,8 +57,8 @@ class SmoothStage {
   void fix(StateFix& out) const { out = fix_; }
   /// The newest window; call after `trim`.
   void window(SmoothedWindow& out) const;
-  /// Relative pose of the newest keyframe to the one before it in `window`, which `window()` returned after
-  /// `trim`.
+  /// Pose of the newest keyframe relative to the previous one in `window`, which must be the result of
+  /// `window()` after `trim`.
   void link(const SmoothedWindow& window, KeyframeLink& out);
   [[nodiscard]] const PlaneTies& planeTies() const { return ties_; }
 
@@ -75,7 +74,7 @@ class SmoothStage {
 
  private:
   bool start(const TrackedFrame& tracked, OdometryOutput& output);
-  /// Discards the estimate, with the next one in the same world where `leave` puts it.
+  /// Discards the estimate. The next one is in the same world, at the pose set by leave().
   void endEpoch();
   void leave(const StartState& at);
   void giveUp();
@@ -84,7 +83,7 @@ class SmoothStage {
   [[nodiscard]] StartState newestAsStart() const;
   Status catchUp();
   Status fail(const Status& status, OdometryOutput& output);
-  /// The first second of an epoch.
+  /// Whether the epoch is in its first second.
   [[nodiscard]] bool starting(Stamp stamp) const;
   void publish(const TrackedFrame& tracked, bool imu_missing, OdometryOutput& output);
   void deliver(OdometryOutput& output);
@@ -106,7 +105,7 @@ class SmoothStage {
   EventBuffer events_;
   EventWatch watch_;
   StateFix fix_;
-  FixedVector<KeyframeState, kMaxStates> left_;       // to be delivered
+  FixedVector<KeyframeState, kMaxStates> left_;       // not yet delivered
   FixedVector<KeyframeState, kMaxStates> left_step_;  // by one step
   bool trim_due_ = false;
   std::uint32_t epoch_ = 0;

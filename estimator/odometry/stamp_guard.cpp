@@ -6,7 +6,7 @@
 namespace swiftlet {
 namespace {
 
-/// ns from `from` to a later stamp; whatever the two are.
+/// ns from `from` to a later stamp; for any two stamps.
 std::uint64_t stepTo(Stamp from, Stamp to) {
   return static_cast<std::uint64_t>(to.ns) - static_cast<std::uint64_t>(from.ns);
 }
@@ -39,8 +39,8 @@ StampVerdict StampGuard::check(Stamp stamp) {
     ++time_.timeline;
     verdict = StampVerdict::kRestarted;
   } else if (time_.any && isFarAhead(time_.newest, stamp)) {
-    // The next one confirms it where it is no farther from it than it is from the stream: also a stream so
-    // slow that every step is far.
+    // The next sample confirms it if it is not far from it, or, for a slow stream in which every step is far,
+    // if this step is not longer than the one before.
     const bool confirmed = holds_ && stamp > held_ &&
                            (!isFarAhead(held_, stamp) || stepTo(held_, stamp) <= stepTo(time_.newest, held_));
     if (!confirmed) {
@@ -65,11 +65,11 @@ StampVerdict ImageGuard::check(Stamp stamp, const ImuTime& imu) {
   if (imu.any && !fits_) {
     if (!near) return StampVerdict::kHeld;
     fits_ = true;
-    any_ = false;  // where it was before the IMU's jump says nothing any more
+    any_ = false;  // positions before the IMU's jump are meaningless
   }
   StampVerdict verdict = StampVerdict::kPass;
   if (any_ && stamp <= newest_) {
-    // Far from both: no late image, but one of another time line.
+    // Far from both: not a late image, but one of another time line.
     if (imu.any && !near && isFarAhead(stamp, newest_)) return StampVerdict::kHeld;
     if (!back_.note(stamp, kAgreeing) || (imu.any && !near)) return StampVerdict::kBehind;
     verdict = StampVerdict::kRestarted;

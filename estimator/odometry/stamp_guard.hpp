@@ -26,8 +26,8 @@ enum class StampVerdict : std::uint8_t {
   kHeld,       ///< does not pass
 };
 
-/// Least step of a stamp that counts as far ahead: longer than the period of the slowest camera (1 s) with
-/// its jitter. A stamp that is wrong by less silences its stream for at most this long.
+/// Smallest step of a stamp that counts as far ahead: longer than the period of the slowest camera (1 s) with
+/// its jitter. A stamp with a smaller error silences its stream for at most this long.
 inline constexpr Duration kFarAhead{1'500'000'000};
 /// Whether `to` is later than `from` by more than kFarAhead; for any two stamps.
 [[nodiscard]] bool isFarAhead(Stamp from, Stamp to);

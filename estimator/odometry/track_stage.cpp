@@ -17,11 +17,11 @@ constexpr float kMaxGate = 40.0F;  // px
 // Predicted pixel error of a landmark after one interval: attitude and position error over depth.
 constexpr double kGateSigmas = 3.0;
 
-// The pixel in whose row camera c sees a point of the middle row's camera. False where the lens does not
-// show it.
+// The pixel at which camera c sees, in its own row, a point given in the camera at the middle row. False if
+// the lens does not show it.
 bool projectToRow(const Rig& rig, std::size_t c, const CameraScan& scan, const Eigen::Vector3d& p,
                   Eigen::Vector2d& pixel) {
-  // Each round leaves a hundredth of the error before it, at 2 rad/s and 20 ms.
+  // Each round reduces the error to a hundredth, at 2 rad/s and 20 ms.
   constexpr int kRounds = 2;
   bool shown = rig.camera[c].project(p, pixel);
   for (int i = 0; shown && rig.rolls() && i < kRounds; ++i) {
@@ -57,7 +57,7 @@ void TrackStage::addImu(const ImuSample& sample) {
     propagator_.setNoise(noise_);
   }
   imu_.push(sample);
-  static_cast<void>(propagator_.step(sample));  // kept, where there is no state yet
+  static_cast<void>(propagator_.step(sample));  // kept for later if there is no state yet
 }
 
 void TrackStage::restart(std::uint32_t timeline, Stamp /*first*/) {
@@ -78,7 +78,7 @@ void TrackStage::forgetTracks() {
 
 void TrackStage::take(const SmoothedWindow& window) {
   if (window.timeline != timeline_) return;
-  // The new epoch that comes with a new time line has the tracks already.
+  // The new epoch of a new time line already has these tracks.
   if (window.epoch != window_.epoch && !restarted_) {
     frontend_.reset();
     propagator_.forgetState();
@@ -91,7 +91,7 @@ void TrackStage::take(const SmoothedWindow& window) {
 
 Status TrackStage::step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
   const Status status = process(frame, effort, tracked);
-  if (!status.ok()) {  // the tracks stay where they were
+  if (!status.ok()) {  // the tracks are unchanged
     ++refused_;
     refused_stamp_ = frame.stamp;
     return status;
@@ -108,7 +108,7 @@ Status TrackStage::step(const StereoFrame& frame, const Effort& effort, TrackedF
 Status TrackStage::process(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked) {
   if (frame.timeline != timeline_)
     return {StatusCode::kInvalidInput, "frame from before the clock was restarted: dropped"};
-  // No late frame: those before it, from when there was no IMU to go by, were stamped far ahead.
+  // Not a late frame: earlier ones, from before there was an IMU to check them, were stamped far ahead.
   if (has_frame_ && isFarAhead(frame.stamp, last_stamp_)) forgetTracks();
   if (has_frame_ && frame.stamp <= last_stamp_) {
     return {StatusCode::kInvalidInput, "the frame's stamp repeats or goes backwards: frame dropped"};
@@ -130,7 +130,7 @@ void TrackStage::predict(Stamp stamp) {
   const Stamp from = last_stamp_ + shift;
   const Stamp to = stamp + shift;
   if (imu_gap_ || isSilent(imu_, noise_, to))
-    return;  // better no prediction than a turn that was not measured
+    return;  // no prediction is better than one from a rotation that was not measured
   const Eigen::Vector3d bias = window_.started ? window_.newest.bias_gyro : Eigen::Vector3d::Zero();
   Preintegration turn(noise_, bias, Eigen::Vector3d::Zero(), window_.calibration.gyro);
   if (!turn.integrate(imu_.around(from, to), from, to).ok()) return;

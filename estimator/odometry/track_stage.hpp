@@ -30,7 +30,7 @@ class TrackStage {
 
   void addImu(const ImuSample& sample);
 
-  /// The window is copied, and the next frame is predicted from it. Windows of another time line are ignored.
+  /// Copies the window, from which the next frames are predicted. Windows of another time line are ignored.
   void take(const SmoothedWindow& window);
 
   /// Call if the IMU's stamps went back permanently (stamp_guard.hpp): discards samples, tracks and window.
@@ -41,7 +41,7 @@ class TrackStage {
   /// image of a wrong size; `tracked` is then unchanged, and the next tracked frame counts the refusal.
   Status step(const StereoFrame& frame, const Effort& effort, TrackedFrame& tracked);
 
-  /// What the front-end gave up in the last step that was ok.
+  /// Observations lost by the front-end in the last successful step.
   [[nodiscard]] const LostSightings& lost() const { return frontend_.lost(); }
 
  private:
