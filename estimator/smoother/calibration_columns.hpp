@@ -30,7 +30,7 @@ struct CalibrationLayout {
   [[nodiscard]] int extrinsicOffset(std::size_t camera) const {
     return times() + kExtrinsicDim * static_cast<int>(camera);
   }
-  /// Columns in the system of a view's columns; -1 if not estimated.
+  /// For each column of a view its column in the system; -1 if not estimated.
   [[nodiscard]] std::array<int, kViewCalibrationDim> columnsOf(std::size_t camera) const {
     std::array<int, kViewCalibrationDim> columns{};
     columns[0] = time_offset ? 0 : -1;

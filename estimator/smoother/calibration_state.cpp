@@ -27,7 +27,7 @@ void CalibrationState::hold(MatrixMap H) {
   if (layout_.cameras > 1) holdBaseline(H);
 }
 
-// Its length alone: a rig that is turned as a whole turns its baseline too.
+// Adds information on the length of the baseline only: a rotation of the whole rig rotates the baseline too.
 void CalibrationState::holdBaseline(MatrixMap H) const {
   const Eigen::Vector3d baseline = now_.T_body_cam[1].translation - now_.T_body_cam[0].translation;
   const double sigma = kBaselinePriorSigma * baseline.norm();

@@ -1,9 +1,9 @@
 #pragma once
-// The calibration of the window: given, or estimated with columns of its own.
+// The calibration of the window: given, or estimated with its own columns.
 //
-// Time offset (t_imu = t_image + offset, s), with it the readout of a rolling shutter (s), and T_body_cam of
-// each camera; error state and columns as in calibration_columns.hpp. The reference of the prior is the value
-// at `hold`.
+// Variables: time offset (t_imu = t_image + offset, s) together with the readout of a rolling shutter (s),
+// and T_body_cam of each camera; error state and columns as in calibration_columns.hpp. The reference of the
+// prior is the value at `hold`.
 
 #include <Eigen/Core>
 #include <array>
@@ -26,9 +26,10 @@ class CalibrationState {
   [[nodiscard]] double readout() const { return now_.readout; }
   [[nodiscard]] const std::array<SE3, kMaxCameras>& T_body_cam() const { return now_.T_body_cam; }
 
-  /// Makes the present values the reference.
+  /// Makes the current values the reference.
   void setReference() { reference_ = now_; }
-  /// The same, and adds the prior information of a calibration to H of a new prior.
+  /// Makes the current values the reference, and adds the prior information of a calibration to H of a new
+  /// prior.
   void hold(MatrixMap H);
   /// Values [-] reference, in the first dimension() rows.
   [[nodiscard]] Vector deviation() const;

@@ -7,8 +7,8 @@ namespace {
 
 constexpr Eigen::Index kPanel = 4;  // columns per update: enough to hide the load of the target
 
-// Takes what four finished columns of L stand for, l0 the first, out of columns [first, n) of A
-// (right-looking). Two columns at once, so that each load of L serves twice.
+// Subtracts the contribution of four finished columns of L, l0 the first, from columns [first, n) of A
+// (right-looking). Two columns at once, so that each load of L is used twice.
 void updateBehind(const double* __restrict l0, Eigen::Index stride, Eigen::Index first, Eigen::Index n,
                   double* a) {
   const double* __restrict const l1 = l0 + stride;
@@ -42,7 +42,7 @@ bool choleskyInPlace(MatrixMap A) {
     const Eigen::Index end = std::min(panel + kPanel, n);
     for (Eigen::Index j = panel; j < end; ++j) {
       double* const column = a + j * stride;
-      // Columns of this panel that are already done.
+      // Columns of this panel that are finished.
       for (Eigen::Index k = panel; k < j; ++k) {
         const double* const done = a + k * stride;
         const double factor = done[j];

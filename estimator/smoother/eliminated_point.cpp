@@ -8,8 +8,8 @@
 namespace swiftlet {
 namespace {
 
-// Relative floor on the point's information, so that a point without parallax is eliminated as a
-// direction: its depth column is weak, not singular.
+// Relative minimum of the point's information. A point without parallax is then eliminated as a direction:
+// its depth column is weak, not singular.
 constexpr double kPointDamping = 1e-9;
 
 }  // namespace

@@ -4,10 +4,10 @@
 // With B_i, c and C = L L^T as in landmark_block.hpp, Y_i = B_i L^-T and z = L^-1 c, the step of the point is
 //   dp = -C^-1 (c + sum_i B_i^T dx_i) = -L^-T (z + sum_i Y_i^T dx_i)       (back-substitution),
 // with i over the states that see it and, if estimated, the columns of the calibration. Units: those of the
-// point (tangent coordinates of the bearing, inverse depth). Y is in single precision: seven digits of a step
-// that the next one corrects. No allocation.
-// Memory: 2.6 KiB per point. Cost: three multiply-adds of eight lanes per state.
-// Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6.1.
+// point (tangent coordinates of the bearing, inverse depth). Y is in single precision: seven digits suffice
+// for a step that the next one corrects. No allocation. Memory: 2.6 KiB per point. Cost: three multiply-adds
+// of eight lanes per state. Source: Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section
+// 6.1.
 
 #include <Eigen/Core>
 #include <array>
@@ -47,22 +47,22 @@ class LandmarkBlock;
 /// A step of the whole system, prepared once for the back-substitution of all points.
 class StepOfStates {
  public:
-  /// `dx`: columns as in `states`, calibration first. Slots without a state may have any offset.
+  /// `dx`: columns as in `states`, calibration first. Slots without a state can have any offset.
   StepOfStates(const VectorMap& dx, const std::array<WindowState, kMaxStates>& states, int calibration);
 
  private:
   friend class EliminatedPoint;
-  /// By slot; zero after the pose.
+  /// By slot; zero after the six pose rows.
   alignas(32) std::array<std::array<float, kPaddedRows>, kMaxStates> pose_{};
   std::array<float, kMaxCalibrationDim> calibration_{};
 };
 
 class EliminatedPoint {
  public:
-  /// From a landmark that was just eliminated.
+  /// Stores the data of a landmark that was just eliminated.
   void keep(const LandmarkBlock& landmark);
 
-  /// 1/m, standard deviation with the states held.
+  /// 1/m, standard deviation with the states held fixed.
   [[nodiscard]] double inverseDepthSigma() const { return L_.i22; }
 
   /// The step of the point for a step of the states.
@@ -71,7 +71,7 @@ class EliminatedPoint {
  private:
   struct StateColumns {
     std::uint32_t slot;
-    float Y[3][kPaddedRows];  ///< by columns, zero after the pose
+    float Y[3][kPaddedRows];  ///< by columns; zero after the six pose rows
   };
 
   PointFactor L_{};

@@ -9,12 +9,12 @@
 namespace swiftlet {
 namespace {
 
-// Eigenvalues below this share of the largest are not information.
+// Eigenvalues below this share of the largest carry no information.
 constexpr double kRelativeRank = 1e-12;
 
 using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kStateDim, kStateDim>;
-// Where a result starts decides which of its entries are computed in vectors: fixed, so that the same numbers
-// do not depend on where the compiler puts a variable.
+// Fixed alignment of results: it determines which entries are computed in vectors, so that the numbers do not
+// depend on where the compiler places a variable.
 constexpr std::size_t kAlignment = 32;
 
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kStateDim, 1>;
@@ -39,13 +39,13 @@ void eliminateColumns(MatrixMap H, VectorMap g, ColumnRange leaving, std::span<c
   const int count = leaving.count;
   alignas(kAlignment) const SmallMatrix W = rootOfInverse(H.block(at, at, count, count));
   const SmallVector w_g = W.transpose() * g.segment(at, count);
-  // Y = H W for the rows of each range, one behind the other.
+  // Y = H W for the rows of each range, stored consecutively.
   const auto rowsOf = [&work, count](const ColumnRange& range) {
     return Eigen::Map<SmallMatrix>(work.data() + static_cast<std::ptrdiff_t>(range.offset) * kStateDim,
                                    range.count, count);
   };
-  // Blocks are copied to matrices of bounded size first: products of blocks of H would ask the heap for
-  // theirs.
+  // Blocks are first copied to matrices of bounded size: products of blocks of H would allocate temporaries
+  // on the heap.
   alignas(kAlignment) SmallMatrix Y;
   for (const ColumnRange& row : others) {
     const SmallMatrix H_row = H.block(row.offset, at, row.count, count);

@@ -1,9 +1,9 @@
 #pragma once
 // Eliminates columns from a quadratic cost by the Schur complement, to turn states into a prior.
 //
-// Shapes: H is n x n with both triangles filled, g is n x 1. At most 15 columns leave; they are inverted by
-// eigenvalues, and those below 1e-12 of the largest (or of 1) carry no information.
-// Memory: none of its own. Cost: quadratic in the remaining columns.
+// Shapes: H is n x n with both triangles filled, g is n x 1. At most 15 columns leave. They are inverted by
+// eigenvalues; eigenvalues below 1e-12 of the largest (or of 1) carry no information. Memory: none of its
+// own. Cost: quadratic in the remaining columns.
 
 #include <Eigen/Core>
 #include <span>

@@ -5,7 +5,7 @@
 namespace swiftlet {
 namespace {
 
-// As kInformationScale (vision_factor.hpp), for a residual of one dimension.
+// Like kInformationScale (vision_factor.hpp), for one-dimensional residuals.
 constexpr double kInformationScale1 = 1.099;
 
 void weigh(double information_scale, LinearFactor& linear) {

@@ -5,13 +5,12 @@
 // extra_states.hpp; world axes, z up:
 //  - point on plane: r = (n . p - d) / sigma; d r = (n^T dp + p^T dn - dd) / sigma.
 //  - direction: horizontal (a floor, n along z) r = (n_x, n_y) / sigma; vertical (a wall) r = n_z / sigma.
-// Robust, Cauchy at 2 sigma, like observations, so that points of another surface do not bend the window.
+// Robust like observations (Cauchy at 2 sigma), so that points of another surface do not distort the window.
 // Unobservable directions: a translation (dp = t, dd = n . t) and a rotation about z (dp = z x p, dn = z x n)
 // change neither a point on a plane nor a vertical plane. The two rows of a horizontal plane depend on the
-// rotation only by the sine of their own residual angle, less than sin^2 / sigma^2.
-// Cost: below 1 us each; no allocation.
-// Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with
-// Structural Regularities", ICRA 2019, section III (regularity factors).
+// rotation only by the sine of their own residual angle, less than sin^2 / sigma^2. Cost: below 1 us each; no
+// allocation. Source: Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation
+// with Structural Regularities", ICRA 2019, section III (regularity factors).
 
 #include <cstdint>
 

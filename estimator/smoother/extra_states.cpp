@@ -16,7 +16,7 @@ Plane::Plane(const Eigen::Vector3d& normal, double distance)
     : rotation_(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), normal).normalized()),
       distance_(distance) {}
 
-// The rotation vector (-b, a, 0) in the plane's axes turns its z axis by (a, b, 0).
+// The rotation vector (-b, a, 0) in the plane's axes moves its z axis by (a, b, 0).
 void Plane::retract(const Eigen::Vector3d& delta) {
   rotation_ = (rotation_ * expSo3(Eigen::Vector3d(-delta[1], delta[0], 0))).normalized();
   distance_ += delta[2];

@@ -1,6 +1,6 @@
 #pragma once
-// Variables besides the body states, in a fixed number of slots: explicit landmarks (with columns of their
-// own) and planes.
+// Variables besides the body states, in a fixed number of slots: explicit landmarks (with their own columns)
+// and planes.
 //
 // Each has three columns (kExtraDim):
 //  - explicit landmark: its position, world, m; the step is added.
@@ -26,14 +26,14 @@ inline constexpr std::uint8_t kNoExtra = 255;
 static_assert(kMaxStates + kMaxExtraStates < kNoExtra, "slots are bytes");
 
 /// Keeps undetermined columns (a plane without points, a landmark with one observation) from being singular.
-/// Only in the solve, not in the prior. Sigmas of a kilometre and a thousand radian, ten orders below an
-/// observation.
+/// Used only in the solve, not in the prior. It corresponds to sigmas of a kilometre and a thousand radian,
+/// ten orders of magnitude below an observation.
 inline constexpr double kWeakInformation = 1e-6;  // 1/m^2, 1/rad^2
 
 /// Unique within one smoother.
 using PlaneId = std::uint64_t;
 
-/// n . p = d. The tangent basis is arbitrary; planes are compared by normal and distance.
+/// n . p = d. The tangent basis is arbitrary, so planes are compared by normal and distance.
 class Plane {
  public:
   Plane() = default;
@@ -70,13 +70,13 @@ struct ExtraValue {
 
 struct ExtraState {
   ExtraKind kind = ExtraKind::kNone;
-  bool in_prior = false;       ///< now or before
+  bool in_prior = false;       ///< is or was part of the prior
   bool leaving = false;        ///< leaves with the next marginalization
-  bool settled = false;        ///< a plane determined by its points, so that its factors count
+  bool settled = false;        ///< for a plane: its points determine it, so its factors are used
   std::uint32_t landmark = 0;  ///< index of its landmark
   PlaneId id = 0;              ///< of a plane
   ExtraValue x;
-  ExtraValue reference;  ///< of the prior
+  ExtraValue reference;  ///< the prior's
   ExtraValue backup;
   int offset = -1;         ///< first column in the normal equations
   int factor_offset = -1;  ///< first column in the factor of the last solve
@@ -87,7 +87,7 @@ struct ExtraState {
   void retract(const Eigen::Vector3d& delta);
   /// x [-] reference.
   [[nodiscard]] Eigen::Vector3d deviation() const;
-  /// Makes x the reference of the prior, which includes it from now on.
+  /// Makes x the reference of the prior, of which it is a part from now on.
   void enterPrior();
 };
 

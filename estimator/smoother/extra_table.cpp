@@ -8,11 +8,11 @@
 namespace swiftlet {
 namespace {
 
-// A Euclidean point is linear in its sightings while its depth is known well: the error of second order is
-// the square of this.
+// Largest relative depth sigma of a promoted landmark. The observations of a Euclidean point are linear only
+// if its depth is accurate: the second-order error is the square of this.
 constexpr double kMaxRelativeDepthSigma = 0.1;
-// A plane takes part once its normal is known to this: with two points, or three nearly on a line, it would
-// turn as it likes and enter the prior there.
+// A plane is used once its normal is known to this. With two points, or three nearly on a line, its normal
+// would be arbitrary and enter the prior.
 constexpr double kMaxNormalSigma = 0.05;  // rad
 constexpr int kFitIterations = 5;
 
@@ -159,8 +159,8 @@ void ExtraTable::linearize(const ExtraFactor& factor, LinearFactor& linear) cons
   swiftlet::linearize(factor, plane, factor.tiesPoint() ? extras_[factor.landmark] : plane, linear);
 }
 
-// The system of one plane with its points held, by whitened rows that allow for the points' own depths too;
-// the largest sigma of its normal, rad.
+// The system of one plane with its points held fixed. The whitened rows also account for the uncertainty of
+// the points' depths. Returns the largest sigma of the normal [rad].
 double ExtraTable::linearizePlane(const ExtraState& plane, Eigen::Matrix3d& H, Eigen::Vector3d& g) const {
   H = kWeakInformation * Eigen::Matrix3d::Identity();
   g.setZero();
@@ -189,8 +189,8 @@ double ExtraTable::linearizePlane(const ExtraState& plane, Eigen::Matrix3d& H, E
   return std::sqrt(mean + std::hypot(half, covariance(0, 1)));
 }
 
-// What a mesh gives is some degrees and centimetres off, many sigmas of a point on a plane, and the robust
-// weight would take the points for outliers.
+// Fits new planes to their points. A plane from the mesh has errors of degrees and centimetres, many sigmas
+// of a point on a plane, so the robust weight would treat its points as outliers.
 void ExtraTable::settlePlanes() {
   Eigen::Matrix3d H;
   Eigen::Vector3d g;
@@ -207,7 +207,7 @@ void ExtraTable::settlePlanes() {
   }
 }
 
-// The landmark's point follows its state: residuals and the window are read from there.
+// Updates the landmark's point, from which residuals and the window are computed.
 void ExtraTable::follow(const ExtraState& extra) {
   LandmarkPoint& point = landmarks_[extra.landmark].point;
   const Eigen::Vector3d ray = extra.x.point - point.reference;
@@ -271,7 +271,7 @@ void ExtraTable::markDepartures(std::uint8_t slot, std::uint64_t oldest_recent) 
   markBarePlanes();
 }
 
-// Planes to which no landmark stays tied.
+// Marks planes without tied landmarks.
 void ExtraTable::markBarePlanes() {
   for (ExtraState& extra : extras_) {
     if (!extra.isPlane()) continue;

@@ -1,5 +1,5 @@
 #pragma once
-// Explicit landmarks and planes of the window: their slots, their factors, how they enter and leave.
+// Explicit landmarks and planes of the window: their slots and factors, and how they enter and leave.
 //
 // Slots 0 to kMaxExplicitLandmarks - 1 are for landmarks, the others for planes. An extra state that leaves
 // is marked, goes into the prior with the next marginalization (marginalization.hpp), and is then freed; if
@@ -34,7 +34,7 @@ class ExtraTable {
   Status addPointOnPlane(TrackId id, PlaneId plane, double sigma);
   Status addPlaneDirection(PlaneId plane, PlaneDirection direction, double sigma);
   void removePointOnPlane(TrackId id, PlaneId plane);
-  /// True if it is in the prior: it is then marked as leaving; otherwise it was removed.
+  /// True if the plane is in the prior and was marked as leaving; false if it was removed.
   bool removePlane(PlaneId plane);
   [[nodiscard]] const ExtraState* findPlane(PlaneId id) const;
   [[nodiscard]] int pointsOn(const ExtraState& plane) const;
@@ -48,9 +48,9 @@ class ExtraTable {
   }
   /// Whitened and weighted.
   void linearize(const ExtraFactor& factor, LinearFactor& linear) const;
-  /// The factors of a plane count once its points determine it.
+  /// Whether a factor is used: not before the plane's points determine it.
   [[nodiscard]] bool counts(const ExtraFactor& factor) const { return extras_[factor.plane].settled; }
-  /// Fits new planes to their points before they count.
+  /// Fits new planes to their points before their factors are used.
   void settlePlanes();
 
   /// Assigns columns; returns the first one after them. columns(): their number.
@@ -60,9 +60,9 @@ class ExtraTable {
   void backup();
   void restore();
 
-  /// Removes a landmark that does not fit. Its part of the prior cannot be removed; everything else is.
+  /// Removes a landmark that does not fit. Only its part of the prior remains.
   void discard(Landmark& landmark);
-  /// Marks explicit landmarks that leave, like structureless ones, with a keyframe if no frame from
+  /// Marks explicit landmarks as leaving by the rule of structureless ones: with a keyframe, if no frame from
   /// `oldest_recent` on sees them. Planes leave with their last point.
   void markDepartures(std::uint8_t slot, std::uint64_t oldest_recent);
   [[nodiscard]] bool departs(const ExtraFactor& factor) const;

@@ -21,27 +21,28 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kGaugeSigma = 1e-4;      // m, rad: the first keyframe holds position and yaw
+constexpr double kGaugeSigma = 1e-4;      // m, rad: holds position and yaw of the first keyframe
 constexpr double kGyroBiasSigma = 0.1;    // rad/s, prior on the first keyframe of an epoch
 constexpr double kAccelBiasSigma = 0.15;  // m/s^2
 constexpr double kOutlierSigmas = 3.5;
 constexpr double kRelativeConvergence = 1e-5;  // of the cost
-constexpr int kOutlierRounds = 2;              // iterations after which outliers are looked for
+constexpr int kOutlierRounds = 2;              // iterations after which outliers are removed
 constexpr int kTriangulationIterations = 5;
-constexpr double kKeptAhead = 0.1;    // s of samples kept across a keyframe, for interpolation
-constexpr double kLongestLink = 5.0;  // s; beyond, an increment's covariance means little
+constexpr double kKeptAhead = 0.1;    // s of samples kept after a keyframe, for interpolation
+constexpr double kLongestLink = 5.0;  // s; the covariance of a longer increment is meaningless
 constexpr double kDampingUp = 10.0;
-// Of the diagonal, for rounding only: the images hold a pose far more firmly than the IMU holds one camera's
-// scale, and with 1e-6 of that the scale needs a hundred iterations.
+// Relative to the diagonal; only against rounding. Images determine a pose much better than the IMU
+// determines the scale of one camera, so with 1e-6 the scale would need a hundred iterations.
 constexpr double kDampingStart = 1e-10;
-constexpr double kFirstMatchGate = 30;  // sigmas: what the loops' relative poses leave, and no more
+constexpr double kFirstMatchGate = 30;  // sigmas: the error that remains after using the loops' relative
+                                        // poses
 constexpr int kPullIterations = 10;
-constexpr std::size_t kMostSightings = 120;  // of a landmark: 20 s at 6 keyframes a second
+constexpr std::size_t kMostSightings = 120;  // per landmark: 20 s at 6 keyframes a second
 constexpr double kPulledEnough = 2e-3;       // m, rad: largest step of a pose
 constexpr Status kStopped{StatusCode::kFailed, kFullSmoothingStopped};
 
-// Without CHOLMOD (a GPL library, see docs/licences.md) Eigen's own factorization serves: the same
-// steps to rounding, slower on long runs.
+// Without CHOLMOD (a GPL library, see docs/licences.md) Eigen's own factorization is used: the same steps to
+// rounding, but slower on long runs.
 #ifdef SWIFTLET_WITH_CHOLMOD
 using SparseFactor = Eigen::CholmodDecomposition<Eigen::SparseMatrix<double>, Eigen::Lower>;
 #else
@@ -115,7 +116,8 @@ void FullSmoother::setCalibration(const CalibrationEstimate& calibration) {
   rig_.readout = calibration.readout;
   rig_.T_body_cam = calibration.T_body_cam;
   intrinsics_ = calibration.gyro;
-  // A keyframe's samples end at its stamp as it was: what lies behind came with the next keyframe.
+  // The samples of a keyframe ended at its stamp with the old time shift; later ones are stored with the next
+  // keyframe.
   for (std::size_t k = 1; later && k + 1 < keyframes_.size(); ++k) {
     std::vector<ImuSample>& samples = keyframes_[k].samples;
     const Stamp end = keyframes_[k].stamp + rig_.camera_to_imu_shift + Duration::fromSeconds(kKeptAhead);
@@ -132,7 +134,7 @@ void FullSmoother::addSighting(const TrackKey& key, const Sighting& sighting) {
     track.sightings.push_back(sighting);
     return;
   }
-  // The landmark goes on as another one: at rest one track would tie all keyframes to each other.
+  // Continue as a new landmark: at rest one track would otherwise connect all keyframes with each other.
   auto full = tracks_.extract(key);
   full.key().second = next_revisit_track_--;
   tracks_.insert(std::move(full));
@@ -177,7 +179,7 @@ void FullSmoother::integrateLinks() {
   }
   for (std::size_t k = 0; rig_.rolls() && k < keyframes_.size(); ++k) {
     Keyframe& keyframe = keyframes_[k];
-    // The samples behind a keyframe come with the next.
+    // Samples after a keyframe are stored with the next one.
     const bool last = k + 1 == keyframes_.size() || keyframes_[k + 1].samples.empty();
     keyframe.scan =
         scanTurn(last ? keyframe.samples : keyframes_[k + 1].samples,
@@ -233,7 +235,7 @@ void FullSmoother::linearizeMotion(System& system, double& cost) const {
     const Eigen::Index at = kStateDim * static_cast<Eigen::Index>(k);
     if (k == 0 || keyframes_[k - 1].epoch != keyframe.epoch) {
       Eigen::Matrix<double, kStateDim, kStateDim> prior = Eigen::Matrix<double, kStateDim, kStateDim>::Zero();
-      // An epoch that loops tie to an earlier one has its position and yaw from there.
+      // An epoch joined to an earlier one by loops gets its position and yaw from there.
       const bool own_world = world(k) == keyframe.epoch;
       const double gauge = own_world ? 1.0 / (kGaugeSigma * kGaugeSigma) : 0.0;
       const Eigen::Vector3d up = keyframe.x.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
@@ -272,7 +274,7 @@ double FullSmoother::linearize(System& system) {
   return cost;
 }
 
-// Every pair that may come to be tied: matches are taken in and withdrawn as the solve goes on.
+// Ties every pair of keyframes that can become connected: matches are added and withdrawn during the solve.
 void FullSmoother::tieAll(System& system) const {
   system.start(keyframes_.size());
   std::map<TrackKey, std::vector<std::uint32_t>> further;
@@ -355,8 +357,8 @@ void FullSmoother::retractAll(const Eigen::VectorXd& step) {
   }
 }
 
-// The loops' relative poses and everything else, until the keyframes stand still: the matches are then near
-// enough to their landmarks to be sightings.
+// Iterates with the loops' relative poses and all other factors until the keyframes stop moving. The matches
+// are then close enough to their landmarks to be used as observations.
 Status FullSmoother::pullTogether(Solver& solver, System& system) {
   tieWorlds(false);
   Eigen::VectorXd step;

@@ -6,18 +6,21 @@
 // then minimizes over the factors of the fixed-lag smoother (except rest): preintegrated IMU between
 // neighbours, landmarks eliminated by their Schur complement, Cauchy weights, outliers removed. The
 // calibration is the given one or an earlier estimate (setCalibration). The reduced system (15 columns per
-// keyframe) is sparse and factored by CHOLMOD, or by Eigen in a build without it. Revisits: each match of a
-// loop is a further observation of the old landmark from the new keyframe, with the noise of a match. The
-// relative poses of the loops first pull the keyframes together and are then dropped, because they are made
-// of the same matches. Matches that do not fit are not used, and tried again twice; a loop with fewer than
-// six matches that fit is left out. A pair of tracks counts once, whatever the number of loops. Frames: those
-// of the odometry. Each epoch has its own world, held by its first keyframe; epochs joined by loops share the
-// world of the earliest. Off the flight path: allocates. Memory is linear in keyframes, up to
-// `max_keyframes`: some 40 kB each at 200 features and 200 Hz, and the sparse system while solving;
-// memoryNeeded() computes it before. A landmark seen for longer than 120 keyframes is continued as a new one,
-// so that only loops connect keyframes farther apart. Keyframes beyond max_keyframes are refused
-// (kCapacityReached), and the rest of the run is not in the map. A match takes 0.3 kB. Source: Kaess et al.,
-// "Square Root SAM", IJRR 2006; factors: docs/smoother.md.
+// keyframe) is sparse and factored by CHOLMOD, or by Eigen in a build without it.
+//
+// Revisits: each match of a loop is a further observation of the old landmark from the new keyframe, with the
+// noise of a match. The relative poses of the loops first pull the keyframes together and are then dropped,
+// because they were computed from the same matches. Matches that do not fit are not used and are tried again
+// twice; a loop with fewer than six fitting matches is not used. A pair of tracks counts once, whatever the
+// number of loops.
+//
+// Frames: those of the odometry. Each epoch has its own world, held by its first keyframe; epochs joined by
+// loops share the world of the earliest. Off the flight path: allocates. Memory is linear in keyframes, up to
+// `max_keyframes`: about 40 kB each at 200 features and 200 Hz, and the sparse system while solving;
+// memoryNeeded() computes it in advance. A match takes 0.3 kB. A landmark seen in more than 120 keyframes is
+// continued as a new one, so that only loops connect keyframes farther apart. Keyframes beyond max_keyframes
+// are refused (kCapacityReached), and the rest of the run is not in the map. Source: Kaess et al., "Square
+// Root SAM", IJRR 2006; factors: docs/smoother.md.
 
 #include <atomic>
 #include <cstdint>
@@ -48,7 +51,7 @@ namespace swiftlet {
 inline constexpr const char* kFullSmoothingStopped = "full smoothing was stopped";
 
 struct FullSmootherSettings {
-  double match_sigma = 1.2;          ///< px, of a match of a loop, including pixel noise
+  double match_sigma = 1.2;          ///< px, of a loop's match, including pixel noise
   std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
   std::size_t max_revisits = 4000;
   int max_iterations = 12;
@@ -63,7 +66,7 @@ struct FullSmootherReport {
   std::size_t landmarks = 0;
   std::size_t revisits = 0;       ///< loops given
   std::size_t revisits_used = 0;  ///< of these, loops whose matches were used
-  std::size_t matches = 0;  ///< of the loops given, without repetitions and without those of unknown tracks
+  std::size_t matches = 0;        ///< of the given loops, without repetitions and without unknown tracks
   std::size_t matches_used = 0;
 };
 
@@ -80,7 +83,7 @@ class FullSmoother {
 
   /// Adds a verified loop between two keyframes added before. kInvalidInput if there is no keyframe at a
   /// stamp, the old one is not older, or the pose or its information is not usable; kCapacityReached beyond
-  /// max_revisits. Matches without track and pixel are left out.
+  /// max_revisits. Matches without track and pixel are skipped.
   Status addRevisit(const LoopRevisit& revisit);
 
   /// Replaces the initial poses, one per keyframe, by those of a pose graph, if the drift is large. Epochs
@@ -137,7 +140,7 @@ class FullSmoother {
     Matrix6d root_information;
     std::size_t first_match = 0;  // in matches_
     std::size_t match_count = 0;
-    std::size_t repeated = 0;  // matches that are in an earlier loop
+    std::size_t repeated = 0;  // matches that are also in an earlier loop
   };
   struct System;
   class Solver;

@@ -1,4 +1,4 @@
-// What full smoothing will take, before it takes it.
+// Predicts the memory of full smoothing before it is allocated.
 
 #include <algorithm>
 #include <limits>
@@ -9,16 +9,16 @@
 namespace swiftlet {
 namespace {
 
-/// Of a std::map or std::set: three pointers, a colour, and the allocator's own.
+/// Node of a std::map or std::set: three pointers, a colour, and the allocator's overhead.
 constexpr std::size_t kNodeBytes = 64;
 /// A value and its row in the factor.
 constexpr std::size_t kEntryBytes = 12;
-/// Code and first work space of the libraries that factor.
+/// Code and initial work space of the factorization libraries.
 constexpr std::size_t kLibraryBytes = std::size_t{8} << 20U;
-/// Work space of the factorization, and what its storage is larger than its entries.
+/// Factor for the work space of the factorization and unused storage.
 constexpr double kFactorMargin = 1.5;
 
-/// Which keyframes are tied to which earlier ones: a bit for each pair.
+/// The pairs of keyframes that are tied: one bit per pair.
 class Pairs {
  public:
   explicit Pairs(std::size_t keyframes) : size_(keyframes), bits_(keyframes * keyframes, false) {
@@ -30,8 +30,9 @@ class Pairs {
   [[nodiscard]] std::size_t count() const {
     return static_cast<std::size_t>(std::count(bits_.begin(), bits_.end(), true));
   }
-  /// Pairs of the factor: each row's is a walk up the elimination tree from every tie of the row (J. Liu,
-  /// "The role of elimination trees in sparse factorization", SIAM J. Matrix Anal. Appl. 1990).
+  /// Number of pairs in the factor: those of each row are found by walking up the elimination tree from every
+  /// tie of the row (J. Liu, "The role of elimination trees in sparse factorization", SIAM J. Matrix Anal.
+  /// Appl. 1990).
   [[nodiscard]] std::size_t countInFactor() const {
     constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
     std::vector<std::size_t> parent(size_, kNone);

@@ -1,4 +1,4 @@
-// Revisits of full smoothing: loops taken in, worlds joined, matches chosen.
+// Revisits of full smoothing: adds loops, joins worlds, selects matches.
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -11,8 +11,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kLeastMatches = 6;  // that fit, for a loop: two more than an accident of four could be
-constexpr std::size_t kLeastTies = 3;     // points that hold one keyframe to another
+constexpr std::size_t kLeastMatches = 6;  // fitting matches per loop: two more than four, which can fit by
+                                          // chance
+constexpr std::size_t kLeastTies = 3;     // points needed to fix one keyframe relative to another
 constexpr int kTriangulationIterations = 5;
 
 bool usable(const SE3& T) { return T.rotation.coeffs().allFinite() && T.translation.allFinite(); }
@@ -22,7 +23,7 @@ std::uint32_t rootOf(const std::map<std::uint32_t, std::uint32_t>& worlds, std::
   return epoch;
 }
 
-/// The turn about z nearest to R: a world's gravity is known.
+/// The rotation about z nearest to R: roll and pitch of a world are known from gravity.
 Eigen::Quaterniond yawPart(const Eigen::Matrix3d& R) {
   const double yaw = std::atan2(R(1, 0) - R(0, 1), R(0, 0) + R(1, 1));
   return Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
@@ -78,7 +79,7 @@ void FullSmoother::forgetPoints() {
   for (auto& [key, track] : tracks_) track.point.triangulated = false;
 }
 
-// The old landmark: the track named, or one made of what the old keyframe saw.
+// Finds the old landmark: the named track, or a new one made from the old keyframe's observation.
 bool FullSmoother::findOldTrack(std::size_t keyframe, const RevisitFeature& feature, TrackKey& key) {
   const std::uint32_t epoch = keyframes_[keyframe].epoch;
   if (feature.has_track) {
@@ -88,7 +89,7 @@ bool FullSmoother::findOldTrack(std::size_t keyframe, const RevisitFeature& feat
   const Sighting sighting = makeSighting(rig_, feature.seen, feature.pixel, settings_.match_sigma,
                                          static_cast<std::uint32_t>(keyframe));
   if (!sighting.any()) return false;
-  // Ids of the odometry count up from zero, these down from the top.
+  // Ids of the odometry count up from zero, these count down from the maximum.
   key = {epoch, next_revisit_track_--};
   tracks_[key].sightings.push_back(sighting);
   return true;
@@ -134,7 +135,7 @@ void FullSmoother::moveWorld(std::uint32_t world, const SE3& T_to_from) {
   }
 }
 
-// Brings worlds that loops tie into one, each by the loop with most matches.
+// Transforms worlds that are connected by loops into one, each by the loop with the most matches.
 void FullSmoother::joinWorlds() {
   for (auto& [epoch, world] : worlds_) world = epoch;
   std::vector<std::size_t> order(revisits_.size());
@@ -170,14 +171,15 @@ std::size_t FullSmoother::matchesInSystem(const Revisit& revisit) const {
     const Match& match = matches_[revisit.first_match + m];
     if (!match.used) continue;
     const Track& track = tracks_.at(match.track);
-    // Outliers may have been removed since.
+    // It may have been removed as an outlier since.
     const auto at = std::ranges::find(track.sightings, match.sighting.slot, &Sighting::slot);
     if (track.in_system && at != track.sightings.end()) ++count;
   }
   return count;
 }
 
-// Which epochs share a world: by all loops given, or by those whose matches are in the system.
+// Determines which epochs share a world: those connected by any loop, or only by loops whose matches are in
+// the system.
 void FullSmoother::tieWorlds(bool by_matches) {
   for (auto& [epoch, world] : worlds_) world = epoch;
   for (const Revisit& revisit : revisits_) {
@@ -214,7 +216,7 @@ void FullSmoother::withdraw(Match& match) {
   std::erase_if(track.sightings, [&](const Sighting& s) { return s.slot == match.sighting.slot; });
 }
 
-// Takes a match in when the landmark that it and the track's other sightings give fits the match.
+// Uses a match if it fits the landmark triangulated from it and the track's other observations.
 void FullSmoother::tryMatch(Match& match, double gate_sigmas) {
   Track& track = tracks_.at(match.track);
   const LandmarkPoint point = track.point;
@@ -237,7 +239,7 @@ void FullSmoother::tryMatch(Match& match, double gate_sigmas) {
                     triangulate(poses_, track.sightings, kTriangulationIterations, track.point);
 }
 
-// All matches are tried anew at the current poses: one that was far off may have come near.
+// Tries all matches again at the current poses, where more of them may fit.
 void FullSmoother::chooseMatches(double gate_sigmas) {
   for (Match& match : matches_) withdraw(match);
   triangulateAll();

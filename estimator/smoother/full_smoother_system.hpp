@@ -1,10 +1,10 @@
 #pragma once
 // The sparse system of full smoothing; internal to FullSmoother's sources.
 //
-// The lower triangle of the reduced normal equations, kStateDim columns per keyframe: for each keyframe a
-// block of its own and one with the previous keyframe, and a pose block for each tied pair. All pairs must be
-// tied before anything is added; contributions are then summed. Memory: kKeyframeBytes per keyframe,
-// kPairBytes per pair, including values and indices of the matrix.
+// The lower triangle of the reduced normal equations, kStateDim columns per keyframe: each keyframe has its
+// own block and one with the previous keyframe, and each tied pair has a pose block. All pairs must be tied
+// before anything is added; contributions are then summed. Memory: kKeyframeBytes per keyframe, kPairBytes
+// per pair, including values and indices of the matrix.
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
@@ -22,12 +22,12 @@
 namespace swiftlet {
 
 struct FullSmoother::System {
-  /// Memory of a block with its column, and its values and indices in the matrix and in the factored copy.
+  /// Memory of a block and its column, and of its values and indices in the matrix and in the factored copy.
   static constexpr std::size_t kPairBytes = sizeof(PaddedBlock) + sizeof(std::uint32_t) + 2 * 36 * 12;
   static constexpr std::size_t kKeyframeBytes = 2 * (225 * 8 + 2 * 225 * 12) + 128;
 
   Eigen::VectorXd g;
-  LandmarkBlock landmark{kMaxStates};  ///< scratch for the present landmark
+  LandmarkBlock landmark{kMaxStates};  ///< scratch for the current landmark
 
   /// Forgets all pairs except those of neighbours.
   void start(std::size_t keyframes) {
@@ -41,7 +41,7 @@ struct FullSmoother::System {
     laid_ = false;
   }
 
-  /// Ties all pairs of these keyframes, which must ascend.
+  /// Ties all pairs of these keyframes, which must be in ascending order.
   void tie(std::span<const std::uint32_t> keyframes) {
     for (std::size_t i = 0; i < keyframes.size(); ++i) {
       std::vector<std::uint32_t>& columns = rows_[keyframes[i]].columns;
@@ -63,7 +63,7 @@ struct FullSmoother::System {
     std::ranges::fill(before_, Matrix15d::Zero());
   }
 
-  /// Block of two tied keyframes, row not before column. Of a keyframe's own block only the lower triangle is
+  /// Block of two tied keyframes, with row >= column. Only the lower triangle of a keyframe's own block is
   /// used.
   PaddedBlock& poseBlock(std::size_t row, std::size_t column) {
     Row& r = rows_[row];
@@ -78,7 +78,7 @@ struct FullSmoother::System {
       }
     }
   }
-  /// The keyframe's own block, and that of its rows with the columns of the previous keyframe.
+  /// The keyframe's own block, and the block of its rows with the columns of the previous keyframe.
   Matrix15d& own(std::size_t keyframe) { return own_[keyframe]; }
   Matrix15d& before(std::size_t keyframe) { return before_[keyframe]; }
 
@@ -115,7 +115,8 @@ struct FullSmoother::System {
 
  private:
   struct Row {
-    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the previous keyframe and its own
+    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the previous keyframe and the
+                                         ///< keyframe itself
     std::vector<PaddedBlock> blocks;
   };
   struct Far {
@@ -127,7 +128,7 @@ struct FullSmoother::System {
     return block(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
   }
 
-  // Memory for all pairs, and the pattern of the matrix.
+  // Allocates memory for all pairs and builds the pattern of the matrix.
   void lay() {
     const std::size_t n = rows_.size();
     far_.assign(n, {});

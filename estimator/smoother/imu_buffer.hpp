@@ -1,8 +1,8 @@
 #pragma once
-// The raw IMU samples of the window, kept so that increments can be integrated again after a bias changed, or
-// over two intervals if the state between them leaves. Contiguous in time (a sliding array, compacted when
-// its end is reached). Full is normal: the oldest samples are dropped first. Memory: twice `capacity` samples
-// of 56 bytes, reserved by the constructor.
+// The raw IMU samples of the window, kept so that increments can be integrated again after a change of bias,
+// or over two intervals when the state between them leaves. Contiguous in time (a sliding array, compacted
+// when its end is reached). When full, the oldest samples are dropped. Memory: twice `capacity` samples of 56
+// bytes, reserved by the constructor.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -20,7 +20,7 @@ class ImuBuffer {
 
   void clear() { begin_ = end_ = 0; }
   [[nodiscard]] bool empty() const { return begin_ == end_; }
-  /// The buffer must not be empty.
+  /// Call only if the buffer is not empty.
   [[nodiscard]] const ImuSample& newest() const { return samples_[end_ - 1]; }
 
   /// Appends; the stamp must be later than the newest's. Amortized O(1).

@@ -1,12 +1,12 @@
 #pragma once
 // Estimates the factor by which the errors of gyro and accelerometer exceed their noise model in a flight.
 //
-// Vibration, g-sensitivity, scale and misalignment are not in the noise densities of data sheets; if they are
+// Vibration, g-sensitivity, scale and misalignment are not in the noise densities of data sheets. If they are
 // ignored, they pull the estimate away from the images. Their size follows from the disagreement of IMU and
 // images after smoothing (motionResiduals). Smoothing absorbs a part: with noise f times the configured one,
 // a share f^2 / (f^2 + kImages) of a link's mean square remains. kImages is the variance that the images
-// leave undetermined, in units of the configured noise variance. The factor only raises the noise, as a low
-// pass. O(1), no memory.
+// leave undetermined, in units of the configured noise variance. The factor only increases the noise,
+// low-pass filtered. O(1), no memory.
 
 #include <algorithm>
 #include <cmath>
@@ -17,9 +17,9 @@ namespace swiftlet {
 
 /// Mean squares of a whitened coordinate.
 struct MotionResiduals {
-  double all = 0;    ///< in the noise in use
-  double gyro = 0;   ///< of rotations over the last seconds, configured noise; 0 while there are too few
-  double accel = 0;  ///< of velocities over the last seconds, in the configured noise
+  double all = 0;    ///< relative to the noise in use
+  double gyro = 0;   ///< of rotations in the last seconds, relative to the configured noise; 0: too few
+  double accel = 0;  ///< of velocities in the last seconds, relative to the configured noise
 };
 
 class ImuExcess {

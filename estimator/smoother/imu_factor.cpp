@@ -8,8 +8,8 @@
 namespace swiftlet {
 namespace {
 
-// What a vehicle may do unseen while the IMU is silent: standard deviations of an acceleration and of
-// an angular rate, each held for the whole gap.
+// Possible motion of a vehicle during a gap in the samples: standard deviations of a constant acceleration
+// and a constant angular rate.
 constexpr double kGapAcceleration = 3.0;  // m/s^2
 constexpr double kGapRate = 1.0;          // rad/s
 

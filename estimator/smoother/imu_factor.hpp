@@ -28,7 +28,7 @@ struct MotionFactor {
 };
 
 /// `intrinsics`: the gyro's; null: those with which `imu` was integrated. False if the covariance is not
-/// positive definite (an interval without duration).
+/// positive definite (an interval of zero length).
 [[nodiscard]] bool imuFactor(const Preintegration& imu, const ImuNoise& noise, const BodyState& x_i,
                              const BodyState& x_j, MotionFactor& factor,
                              const GyroIntrinsicsState* intrinsics = nullptr);

@@ -5,9 +5,9 @@
 namespace swiftlet {
 namespace {
 
-// A keyframe with less than this share of its landmarks seen lately has nothing to add.
+// A keyframe of whose landmarks less than this share was seen recently is useless.
 constexpr double kMinSharedLandmarks = 0.05;
-// One radian of turn separates two keyframes as much as this distance.
+// A rotation by one radian separates two keyframes as much as this distance.
 constexpr double kMetresPerRadian = 1.0;
 constexpr double kMinDistance = 1e-2;  // m, keeps the score finite
 

@@ -13,11 +13,12 @@ namespace swiftlet {
 struct KeyframeInWindow {
   SE3 T_world_body;
   bool keyframe = false;  ///< other states do not count for the density
-  int seen = 0;           ///< landmarks that it sees
-  int shared = 0;         ///< of these, landmarks that a recent frame sees too
+  int seen = 0;           ///< number of landmarks that it sees
+  int shared = 0;         ///< of these, landmarks also seen in a recent frame
 };
 
-/// Index in `window` (states in order of time) of one of the first `candidates`. O(candidates * states).
+/// Returns the index in `window` (states in order of time) of one of the first `candidates`. O(candidates *
+/// states).
 std::size_t keyframeToDrop(std::span<const KeyframeInWindow> window, std::size_t candidates);
 
 }  // namespace swiftlet

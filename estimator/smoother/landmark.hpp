@@ -26,7 +26,7 @@
 
 namespace swiftlet {
 
-/// In single precision, accurate to 1e-4 px, which halves the memory that a solve reads.
+/// In single precision, accurate to 1e-4 px, which halves the memory traffic of a solve.
 struct CameraSighting {
   bool used = false;
   Eigen::Vector3f bearing = Eigen::Vector3f::Zero();  ///< m, unit, camera frame
@@ -67,19 +67,19 @@ struct Landmark {
   std::uint64_t last_frame = 0;  ///< index of the newest frame that saw it
   int frames_seen = 0;
   int rejections = 0;             ///< number of solves in which it did not fit
-  bool in_system = false;         ///< takes part in the present solve
+  bool in_system = false;         ///< used in the current solve
   double mean_square = 0;         ///< of its whitened residuals after the last solve
   std::uint8_t extra = kNoExtra;  ///< index of its extra state; kNoExtra: structureless
   LandmarkPoint point;
   FixedVector<Sighting, kMaxStates> sightings;
 
   [[nodiscard]] std::span<const Sighting> views() const { return {sightings.data(), sightings.size()}; }
-  /// In the last solve, and it fitted: its point is not given up.
+  /// Whether it was in the last solve and fitted.
   [[nodiscard]] bool accepted() const { return in_system && point.triangulated; }
   [[nodiscard]] bool seenFrom(std::uint32_t slot) const {
     return std::ranges::find(sightings, slot, &Sighting::slot) != sightings.end();
   }
-  /// Number of observations, each camera counted.
+  /// Number of observations, counted per camera.
   [[nodiscard]] int viewCount() const {
     int count = 0;
     for (const Sighting& s : sightings) count += int{s.camera[0].used} + int{s.camera[1].used};

@@ -12,7 +12,7 @@ bool samePlace(const CameraPose& a, const CameraPose& b) {
   return a.center == b.center && a.R_cam_world == b.R_cam_world && a.rows.velocity == b.rows.velocity;
 }
 
-// M x + offset, M the same for all lanes.
+// M x + offset, with the same M for all lanes.
 void transform(const Eigen::Matrix3d& M, const V (&x)[3], const Eigen::Vector3d& offset, V (&result)[3]) {
   SWIFTLET_UNROLL
   for (std::size_t k = 0; k < 3; ++k) {
@@ -21,7 +21,7 @@ void transform(const Eigen::Matrix3d& M, const V (&x)[3], const Eigen::Vector3d&
   }
 }
 
-// A point as one seen from a place a metre behind it: its inverse depth is 1, whatever the place.
+// A position as a LandmarkPoint: with a reference one metre behind it, its inverse depth is always 1.
 LandmarkPoint pointAt(const Eigen::Vector3d& p) {
   LandmarkPoint point;
   point.triangulated = true;
@@ -81,7 +81,8 @@ void LandmarkBlock::linearizeAll(const LandmarkViews& views, const At& at) {
   }
 }
 
-// One camera of four states. With a global shutter one reprojection serves for residuals and Jacobians.
+// Views of four states by one camera. With a global shutter one reprojection serves for residuals and
+// Jacobians.
 void LandmarkBlock::addViews(std::size_t c, const Camera& camera, std::span<const Sighting> four,
                              RigPoses poses, const At& at, std::size_t group) {
   lanes::ViewPointers current;
@@ -149,8 +150,8 @@ void LandmarkBlock::addRows(std::size_t c, const Camera& camera, const lanes::Vi
   }
 }
 
-// d r / d time offset = what the body's motion does in it; d r / d readout, as much of it as the row is away
-// from the middle; d r / d T_body_cam, rotation on the right.
+// Columns: d r / d time offset, from the motion of the body; d r / d readout, the same times the row's
+// position relative to the middle; d r / d T_body_cam, rotation on the right.
 void LandmarkBlock::addCalibration(std::size_t c, const Camera& camera, const lanes::Residuals& at,
                                    double inverse_depth, const V (&G)[3], const Row& row, std::size_t group) {
   V K[3];
@@ -176,7 +177,7 @@ void LandmarkBlock::addCalibration(std::size_t c, const Camera& camera, const la
 bool LandmarkBlock::eliminate() {
   states_.clear();
   if (valid_states_ < 2) return false;
-  // A copy: stores to the groups cannot change it, as far as the compiler sees.
+  // A local copy, so that the compiler knows that stores to the groups do not change it.
   PointFactor L;
   if (!L.compute(sums_.H())) return false;
   const Eigen::Vector3d c = sums_.g();
@@ -185,7 +186,7 @@ bool LandmarkBlock::eliminate() {
   L_ = L;
   z_ << z[0], z[1], z[2];
   for (PoseGroup& group : groups_) {
-    // Y_i = B_i L^-T: each row is solved for by itself.
+    // Y_i = B_i L^-T, solved separately for each row.
     SWIFTLET_UNROLL
     for (std::size_t i = 0; i < kPoseDim; ++i) {
       V(&y)[3] = group.point[i];
@@ -213,7 +214,7 @@ void LandmarkBlock::keepPoint() {
   if (layout_.dimension() > 0) gatherCalibration();
 }
 
-// Lane by lane, those whose state has the point in front of it.
+// Writes the lanes of states that have the point in front of a camera.
 void LandmarkBlock::writeStates() {
   states_.clear();
   for (std::size_t s = 0; s < sightings_.size(); ++s) {
@@ -239,7 +240,7 @@ void LandmarkBlock::writeStates() {
   }
 }
 
-// From the cameras' own columns to the layout's.
+// From the columns of each camera to those of the layout.
 void LandmarkBlock::gatherCalibration() {
   calibration_ = {};
   cross_.assign(states_.size(), PoseCalibration::Zero());

@@ -1,6 +1,6 @@
 #pragma once
-// Linearizes a landmark at the states that see it and eliminates its point: for the fixed lag, full smoothing
-// and landmarks on planes. The start with one camera (mono_start.cpp) has its own code.
+// Linearizes a landmark at the states that see it and eliminates its point. Used for the fixed lag, full
+// smoothing and landmarks on planes. The start with one camera (mono_start.cpp) has its own code.
 //
 // For state i with Jacobians J_i (pose), P_i (point) and K_i (calibration) of all its views, whitened and
 // weighted, and residuals r_i:
@@ -8,10 +8,10 @@
 //   L^T;   with calibration K = sum K_i^T K_i,  B_k = sum K_i^T P_i,  a_k = sum K_i^T r_i,  A_ik = J_i^T K_i.
 // Eliminating the point leaves, with Y = B L^-T and z = L^-1 c,
 //   A_i - Y_i Y_i^T at state i,  -Y_i Y_j^T between states,  a_i - Y_i z in the gradient,
-// and the same with k instead of i. The owner of the pair blocks computes the pairs (PairProduct).
-// The point is a bearing with inverse depth (landmark.hpp) or, for an explicit landmark, a position.
-// Residuals and robust weights are taken at the current poses, Jacobians at RigPose::linearization.
-// Frames and Jacobians: vision_factor.hpp. Four states at a time, in vector lanes (view_lanes.hpp); the
+// and the same with k instead of i. The owner of the pair blocks computes the pairs (PairProduct). The point
+// is a bearing with inverse depth (landmark.hpp) or, for an explicit landmark, a position. Residuals and
+// robust weights are computed at the current poses, Jacobians at RigPose::linearization. Frames and
+// Jacobians: vision_factor.hpp. Four states are processed at a time, in vector lanes (view_lanes.hpp); the
 // scalar version is in tests/smoother/scalar_landmark.hpp. Memory: 1.1 kB per observation (2.4 kB with
 // calibration), reserved by the constructor. Cost: linear in the views. Source: Triggs et al., "Bundle
 // Adjustment - A Modern Synthesis", 1999, section 6.
@@ -39,32 +39,33 @@ class LandmarkBlock {
   using CalibrationPoint = Eigen::Matrix<double, kMaxCalibrationDim, 3>;
   using PoseCalibration = Eigen::Matrix<double, kPoseDim, kMaxCalibrationDim>;
 
-  /// A state that observed it, in the order of the observations: A, B, a, or their values after elimination.
+  /// A state that observed the landmark, in the order of the observations: A, B, a, or their values after
+  /// elimination.
   struct State {
     std::uint32_t slot = 0;
     PaddedBlock information;                        ///< lower triangle
     alignas(32) double point[3][kPaddedRows] = {};  ///< B or Y, by columns
     alignas(32) double gradient[kPaddedRows] = {};
   };
-  /// Of the calibration: K, B_k, a_k, or their values after elimination. Columns as in the layout.
+  /// Calibration: K, B_k, a_k, or their values after elimination. Columns as in the layout.
   struct Calibration {
     CalibrationMatrix information = CalibrationMatrix::Zero();
     CalibrationPoint point = CalibrationPoint::Zero();
     CalibrationVector gradient = CalibrationVector::Zero();
   };
 
-  /// More observations than this allocate memory.
+  /// `max_sightings`: more observations allocate memory.
   explicit LandmarkBlock(std::size_t max_sightings);
 
-  /// Linearizes a landmark without columns of its own.
+  /// Linearizes a landmark without its own columns.
   void linearize(const LandmarkViews& views, const LandmarkPoint& point);
   /// Linearizes an explicit landmark with respect to its position (world, m).
   void linearize(const LandmarkViews& views, const Eigen::Vector3d& position);
 
-  /// After linearize(). False if fewer than two states have the point in front of a camera or its information
-  /// is singular; there is then nothing to add.
+  /// Call after linearize(). False if fewer than two states have the point in front of a camera or its
+  /// information is singular; then nothing must be added.
   [[nodiscard]] bool eliminate();
-  /// Instead of eliminate(), for an explicit landmark.
+  /// Call instead of eliminate() for an explicit landmark.
   void keepPoint();
 
   [[nodiscard]] std::span<const State> states() const { return {states_.data(), states_.size()}; }
@@ -136,8 +137,8 @@ class LandmarkBlock {
   std::vector<State> states_;
   std::vector<std::array<CrossGroup, kMaxCameras>> cross_groups_;
   std::array<CalibrationSums, kMaxCameras> calibration_sums_;
-  lanes::V rates_[6];  // angular rate (body) and velocity (world) of the present four states
-  lanes::V rows_{};    // of the present views (CameraSighting::row)
+  lanes::V rates_[6];  // angular rate (body) and velocity (world) of the current four states
+  lanes::V rows_{};    // of the current views (CameraSighting::row)
   Calibration calibration_;
   std::vector<PoseCalibration> cross_;
 };

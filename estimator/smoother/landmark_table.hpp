@@ -1,11 +1,11 @@
 #pragma once
 // The landmarks of the window: storage, search by id, admission and removal.
 //
-// A landmark keeps its index until it is removed; a new one gets the lowest free index, and iteration is in
-// the order of indices, so that sums do not depend on the history. Full is normal (kMaxLandmarks): the
-// landmark lost longest ago is removed; explicit landmarks leave by other rules (extra_table.hpp).
-// Memory: 2.1 MiB, reserved by the constructor. Cost: a search is logarithmic; adding one with an id above
-// all others is O(1) until the table is full.
+// A landmark keeps its index until it is removed; a new one gets the lowest free index. Iteration is in the
+// order of indices, so that sums do not depend on the history. When full (kMaxLandmarks), the landmark that
+// was lost longest ago is removed; explicit landmarks leave by other rules (extra_table.hpp). Memory: 2.1
+// MiB, reserved by the constructor. Cost: a search is logarithmic; adding one with an id above all others is
+// O(1) until the table is full.
 
 #include <array>
 #include <bit>
@@ -39,7 +39,7 @@ class LandmarkTable {
   LandmarkTable() : landmarks_(kMaxLandmarks) {}
 
   void clear();
-  /// Null if there is none.
+  /// Null if there is none with this id.
   [[nodiscard]] Landmark* find(TrackId id);
   [[nodiscard]] const Landmark* find(TrackId id) const { return const_cast<LandmarkTable*>(this)->find(id); }
   /// Adds an empty landmark; `id` must be new.
@@ -54,7 +54,7 @@ class LandmarkTable {
   Landmark& operator[](std::size_t index) { return landmarks_[index]; }
   const Landmark& operator[](std::size_t index) const { return landmarks_[index]; }
 
-  /// The present landmark may be removed during the iteration.
+  /// The current landmark may be removed during the iteration.
   [[nodiscard]] auto begin() { return Iterator<LandmarkTable, Landmark>(*this, usedFrom(0)); }
   [[nodiscard]] auto end() { return Iterator<LandmarkTable, Landmark>(*this, kMaxLandmarks); }
   [[nodiscard]] auto begin() const {

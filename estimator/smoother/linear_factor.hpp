@@ -1,5 +1,5 @@
 #pragma once
-// A small linearized factor over any variables, in the form that the normal equations need.
+// A small linearized factor over any variables, as input of the normal equations.
 //
 // Shapes: `jacobian` has up to kMaxRows rows and `columns` columns, whose columns in the system are in
 // `column`; `residual` has as many rows. Both are whitened and multiplied by the root of the robust weight;
@@ -17,7 +17,7 @@ namespace swiftlet {
 
 struct LinearFactor {
   static constexpr int kMaxRows = 3;
-  /// Enough for calibration and two whole states.
+  /// Enough for the calibration and two complete states.
   static constexpr int kMaxColumns = kMaxCalibrationDim + 2 * kStateDim;
 
   int columns = 0;

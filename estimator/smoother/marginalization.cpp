@@ -25,13 +25,13 @@ void Marginalization::marginalize(WindowProblem& problem, NormalEquations& syste
   }
 }
 
-// Structureless landmarks leave with a keyframe once no recent frame sees them.
+// Whether a structureless landmark leaves with the keyframe: if no recent frame sees it.
 bool Marginalization::leaves(const WindowProblem& problem, const Landmark& landmark) const {
   return landmark.extra == kNoExtra && landmark.last_frame < problem.oldest_recent_frame &&
          landmark.sightings.size() >= 2 && landmark.seenFrom(landmarks_of_);
 }
 
-// What the prior or a leaving factor touches.
+// Marks the variables that the prior or a leaving factor involves.
 void Marginalization::involve(WindowProblem& problem, const Departure& departure) {
   involved_.fill(false);
   if (slot_ != kNoSlot) involved_[slot_] = true;
@@ -76,7 +76,7 @@ void Marginalization::build(WindowProblem& problem, NormalEquations& system, con
   if (landmarks_of_ != kNoSlot) {
     for (Landmark& landmark : problem.landmarks) {
       if (!leaves(problem, landmark)) continue;
-      // One that constrains nothing leaves without a trace.
+      // A landmark that constrains nothing does not change the prior.
       if (landmark.accepted()) {
         static_cast<void>(
             system.addLandmark(problem.viewsOf(landmark.views()), landmark.point, problem.window.slots()));
@@ -92,8 +92,8 @@ void Marginalization::build(WindowProblem& problem, NormalEquations& system, con
   }
 }
 
-// Extra states one by one, then the body state's columns. What stays: all extra columns, in ranges that need
-// not be variables, and the states involved.
+// Eliminates extra states one by one, then the columns of the body state. What remains: all extra columns, in
+// ranges that need not be variables, and the involved states.
 void Marginalization::eliminate(const WindowProblem& problem, NormalEquations& system,
                                 const Departure& departure) {
   const bool state_leaves = departure.count > 0;
@@ -125,7 +125,8 @@ void Marginalization::eliminate(const WindowProblem& problem, NormalEquations& s
   if (state_leaves) eliminateRange(body, others.size() - 1);
 }
 
-// The old prior is in the system: its memory takes the new one, whose reference are the current values.
+// The system contains the old prior, so its memory is reused for the new one, whose reference is the current
+// values.
 void Marginalization::writePrior(WindowProblem& problem, NormalEquations& system,
                                  const Departure& departure) const {
   Prior& prior = problem.prior;

@@ -20,8 +20,9 @@ struct Departure {
   std::size_t position = 0;
   int first = 0;
   int count = 0;                    ///< zero: only extra states
-  bool with_motion_factor = false;  ///< with the motion factor to the next state
-  bool with_landmarks = false;      ///< that no recent frame sees, and its observations of explicit ones
+  bool with_motion_factor = false;  ///< includes the motion factor to the next state
+  bool with_landmarks = false;      ///< includes landmarks not seen by recent frames, and the state's
+                                    ///< observations of explicit landmarks
 };
 
 class Marginalization {
@@ -43,7 +44,7 @@ class Marginalization {
   [[nodiscard]] bool leaves(const WindowProblem& problem, const Landmark& landmark) const;
 
   std::uint8_t slot_ = kNoSlot;          // of the state that loses columns
-  std::uint8_t landmarks_of_ = kNoSlot;  // the same, if its landmarks leave too
+  std::uint8_t landmarks_of_ = kNoSlot;  // the same, if landmarks leave with it
   std::array<bool, kMaxStates + kMaxExtraStates> involved_{};
   std::vector<double> work_;
 };

@@ -22,7 +22,7 @@ void NormalEquations::begin(const CalibrationLayout& calibration, int dimension)
   MatrixMap h = H();
   for (int c = 0; c < dimension; ++c) h.col(c).tail(dimension - c).setZero();
   g().setZero();
-  // Only what the last system used is not zero.
+  // Clear only the blocks used by the last system.
   for (std::size_t i = 0; i < kMaxStates; ++i) {
     if (!touched_[i]) continue;
     for (std::size_t j = 0; j < kMaxStates; ++j) {
@@ -90,8 +90,8 @@ bool NormalEquations::addLandmark(const LandmarkViews& views, const LandmarkPoin
   if (!landmark_->eliminate()) return false;
   if (eliminated != nullptr) eliminated->keep(*landmark_);
   addStates(states);
-  // The only part that is quadratic in the states. Both orders of a pair are met, the one below the diagonal
-  // counts.
+  // The only part that is quadratic in the states. Each pair occurs in both orders; the one below the
+  // diagonal is used.
   const std::span<const LandmarkBlock::State> seen = landmark_->states();
   for (const LandmarkBlock::State& i : seen) {
     const PairProduct product(i);
@@ -120,7 +120,7 @@ void NormalEquations::addExplicitLandmark(const LandmarkViews& views, const Eige
   }
 }
 
-// What the landmark at hand says of each state by itself, and of the calibration.
+// Adds the terms of the current landmark in single states and in the calibration.
 void NormalEquations::addStates(const std::array<WindowState, kMaxStates>& states) {
   cost_ += landmark_->cost();
   for (const LandmarkBlock::State& state : landmark_->states()) {

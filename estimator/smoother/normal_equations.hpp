@@ -43,15 +43,16 @@ class NormalEquations {
   [[nodiscard]] double cost() const { return cost_; }
   MatrixMap H();
   VectorMap g();
-  /// Exchanges the memory of the matrix for other memory of alignedMapSize(kMaxSystemDim), to keep a factor
-  /// without copying it. There is no H until begin().
+  /// Exchanges the memory of the matrix for other memory of alignedMapSize(kMaxSystemDim), so that a factor
+  /// can be kept without copying. H() is invalid until begin().
   void swapMatrix(std::vector<double>& memory) { h_.swap(memory); }
 
-  /// Both states have all 15 columns. Those of the intrinsics, if the factor has any, start at `gyro_offset`.
+  /// Adds a motion factor between two states with all 15 columns. The gyro intrinsics' columns, if the factor
+  /// has any, start at `gyro_offset`.
   void addMotion(const MotionFactor& factor, const WindowState& i, const WindowState& j, int gyro_offset = 0);
 
-  /// Information 1 / sigma^2 on three columns of one state, from `first` on. `residual` is their value minus
-  /// its reference; `residual` and `sigma` have the unit of the columns.
+  /// Adds information 1 / sigma^2 on the three columns of a state from `first` on. `residual` is their value
+  /// minus the reference; `residual` and `sigma` have the unit of the columns.
   void addDiagonal(const WindowState& state, int first, const Eigen::Vector3d& residual, double sigma);
 
   /// A small factor over any variables, each column at most once.

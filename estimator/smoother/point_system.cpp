@@ -5,7 +5,7 @@
 namespace swiftlet {
 namespace {
 
-// Calls `use` with the views of all sightings in fours, the last ones perhaps fewer.
+// Calls `use` with the views of all observations in groups of four; the last group may be smaller.
 template <typename F>
 void inGroups(RigPoses poses, std::span<const Sighting> sightings, const F& use) {
   lanes::ViewPointers pointers;
@@ -23,7 +23,7 @@ void inGroups(RigPoses poses, std::span<const Sighting> sightings, const F& use)
   if (lane > 0) use(pointers);
 }
 
-// Mean squared residual of a point behind a camera that saw it: fits nowhere.
+// Mean squared residual of a point behind a camera that observed it, above any limit.
 constexpr double kBehindCamera = 1e6;
 
 struct Sums {
@@ -58,7 +58,7 @@ double meanSquaredResidual(RigPoses poses, std::span<const Sighting> sightings, 
     const lanes::ViewGroup group(p);
     const lanes::Residuals residuals(group, point);
     in_front = in_front && !lanes::any(group.used & ~residuals.in_front);
-    // A lane that is not used computes with another's numbers.
+    // An unused lane contains the numbers of another one.
     squares += group.used ? residuals.r[0] * residuals.r[0] + residuals.r[1] * residuals.r[1] : lanes::V{};
     views += lanes::count(group.used);
   });

@@ -1,5 +1,5 @@
 #pragma once
-// The Gauss-Newton system of a landmark's point with the poses held, for triangulation.
+// The Gauss-Newton system of a landmark's point with the poses held fixed, for triangulation.
 //
 // Shapes: H is 3 x 3, g is 3 x 1, over two tangent coordinates of the bearing and the inverse depth.
 // Views are gathered into vector lanes once and linearized several times.
@@ -22,8 +22,8 @@ struct PointSystem {
   bool in_front = true;  ///< true if in front of all cameras
 };
 
-/// The views of a landmark at the current poses, which must outlive this object. Views beyond the capacity of
-/// a window (full smoothing has no limit) are gathered again at each linearization.
+/// Gathers the views of a landmark at the current poses, which must outlive this object. Views beyond the
+/// capacity of a window (full smoothing has no limit) are gathered again at each linearization.
 class PointViews {
  public:
   PointViews(RigPoses poses, std::span<const Sighting> sightings);

@@ -3,9 +3,9 @@
 //
 //   cost(d) = 1/2 d^T H d + b^T d,   d = x [-] reference, stacked over the prior's blocks.
 // d is in the error state of state.hpp (rotation on the right; calibration as in CalibrationLayout). The
-// reference are the values at the last marginalization. The Hessian form is stored in double precision; the
-// advantage of the square-root form applies to single precision only. Memory: 2.7 MiB, reserved by the
-// constructor. H is full (both triangles), n x n, n = dimension().
+// reference is the values at the last marginalization. The Hessian form is stored in double precision; the
+// square-root form would only be better in single precision. Memory: 2.7 MiB, reserved by the constructor. H
+// is full (both triangles), n x n, n = dimension().
 
 #include <Eigen/Core>
 #include <array>
@@ -30,7 +30,8 @@ inline constexpr std::size_t kMaxPriorBlocks = kMaxStates + kMaxExtraStates + 2;
 struct PriorBlock {
   static constexpr std::uint8_t kCalibration = 255;
   static constexpr std::uint8_t kGyroIntrinsics = 254;
-  std::uint8_t slot = 0;  ///< of a body state, of an extra state from kMaxStates on, or a constant above
+  std::uint8_t slot = 0;  ///< slot of a body state; of an extra state, from kMaxStates on; or a constant
+                          ///< above these
   int dimension = 0;      ///< the first 6 or 15 columns of a body state, or all columns of others
   int offset = 0;         ///< first column in H and b
   BodyState reference;    ///< of a body state; extra states and calibration store their own

@@ -1,5 +1,5 @@
 #pragma once
-// A measured relative pose of two body states, from a loop closure of two keyframes.
+// Factor for a measured relative pose of two body states, from a loop closure between two keyframes.
 //
 // Residual, 6 x 1, order phi, p, whitened by a root A of the information (A^T A = information):
 //   r = A [ Log(R(E)); p(E) ],   E = T_old_new_measured^-1 T_world_old^-1 T_world_new,

@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kOutlierSigmas = 3.5;  // of a residual that says something of its track's errors
+constexpr double kOutlierSigmas = 3.5;  // largest residual used for the correlation of errors
 
 }  // namespace
 
@@ -48,7 +48,7 @@ void Smoother::addState(const StepInput& input) {
   WindowState& state = window.inSlot(window.add());  // trim() leaves a free slot
   state.time_offset = problem_.calibration.timeOffset();
   if (!first) {
-    // A correction by more than a frame's interval must not turn the order of two frames around.
+    // A correction of the time offset must not change the order of two frames.
     const WindowState& before = window[window.size() - 2];
     const double interval = (input.frame->stamp - before.stamp).seconds() + before.time_offset;
     state.time_offset = std::max(state.time_offset, before.time_offset - 0.5 * interval);
@@ -89,7 +89,8 @@ void Smoother::linkState(WindowState& state, const WindowState& previous, bool g
   state.x.v_world_body = previous.x.v_world_body + dt * g + T.rotation * state.imu.deltaVelocity();
 }
 
-// Ids rise with every detection, so those up to this one have been followed for longest.
+// The newest id among the `max_features` smallest. Ids increase with every detection, so these features have
+// been tracked for longest.
 TrackId Smoother::newestIdTaken(const TrackedFrame& frame, int max_features) {
   const auto count = static_cast<std::size_t>(std::max(max_features, 1));
   if (frame.features.size() <= count) return std::numeric_limits<TrackId>::max();
@@ -126,7 +127,7 @@ void Smoother::updateStatistics() {
   double sum = 0;
   int views = 0;
   for (const Landmark& landmark : problem_.landmarks) {
-    // An explicit landmark may have lost its last sighting.
+    // An explicit landmark may have lost its last observation.
     if (!landmark.accepted() || landmark.sightings.empty()) continue;
     ++statistics_.landmarks;
     const int count = landmark.viewCount();
@@ -140,7 +141,8 @@ void Smoother::updateStatistics() {
   if (views > 0) statistics_.reprojection_rms = pixel_noise_.sigma() * std::sqrt(sum / views);
   WindowState& state = problem_.window.newest();
   MotionResiduals residuals = motionResiduals(problem_);
-  // It alone knows one camera's scale: a window that doubts it loses the scale, and doubts it the more.
+  // With one camera only the accelerometer determines the scale. Increasing its noise would lose the scale,
+  // and the disagreement would grow further.
   if (problem_.rig.camera_count == 1) residuals.accel = 0;
   statistics_.imu_residual = std::sqrt(residuals.all);
   statistics_.noise.imu = state.imu_factors;
@@ -153,7 +155,7 @@ void Smoother::updateStatistics() {
   if (state.keyframe) updateTrackCorrelation();
 }
 
-// Of the two newest keyframes that stay: the newest frames and one more stand behind them.
+// Uses the two newest keyframes that stay; the newest frames and one more state are after them.
 void Smoother::updateTrackCorrelation() {
   const Window& window = problem_.window;
   const std::size_t recent = static_cast<std::size_t>(settings_.max_recent) + 1;
@@ -241,7 +243,7 @@ CalibrationEstimate Smoother::calibration() {
   if (layout.time_offset) estimate.shift_sigma = std::sqrt(P(0, 0));
   if (layout.readout) estimate.readout_sigma = std::sqrt(P(1, 1));
   if (!layout.extrinsics) return estimate;
-  // Both cameras' turns in body axes, one less the other.
+  // Difference of the two cameras' rotations, in body axes.
   Eigen::Matrix<double, 3, kMaxCalibrationDim> J = Eigen::Matrix<double, 3, kMaxCalibrationDim>::Zero();
   for (std::size_t c = 0; c < layout.cameras; ++c) {
     const int at = layout.extrinsicOffset(c);

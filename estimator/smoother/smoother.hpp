@@ -2,20 +2,22 @@
 // Fixed-lag smoother: Gauss-Newton over a sliding window of body states.
 //
 // Window, in order of time: pose-only keyframes; keyframes with velocity and biases; the newest frames. A
-// frame that is no keyframe leaves by merging its two IMU intervals, without a permanent linearization. An
-// old keyframe first loses velocity and biases, then its pose, both into the prior, the latter with the
+// frame that is not a keyframe leaves by merging its two IMU intervals, without a permanent linearization. An
+// old keyframe first loses velocity and biases, then its pose, both into the prior; with the pose leave the
 // landmarks that it saw and no recent frame sees. Landmarks are structureless until they are promoted to
-// columns of their own; planes are further columns (extra_states.hpp). Data: window, landmark_table,
-// extra_table, calibration_state, prior (together: window_problem). Operations: window_factors,
-// window_solver, window_covariance, window_trim, marginalization. Frames: world (z up, origin and yaw of the
-// first state), body (= IMU), cameras. SI units, pixels. Memory: 16.6 MiB, reserved by the constructor; no
-// allocation afterwards. Full is normal: the landmark not seen for longest and the oldest IMU samples are
-// dropped first. Cost: linear in landmarks, cubic in the dimension of the window (at
-// most 192 columns by default, and 3 for each explicit landmark and plane). Sources: Leutenegger et al.,
-// "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015 (window);
-// Usenko et al., "Visual-Inertial Mapping with Non-Linear Factor Recovery", RA-L 2020 (what leaves when);
-// Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with Structural
-// Regularities", ICRA 2019 (planes).
+// their own columns; planes are further columns (extra_states.hpp).
+//
+// Data: window, landmark_table, extra_table, calibration_state, prior (together: window_problem). Operations:
+// window_factors, window_solver, window_covariance, window_trim, marginalization. Frames: world (z up, origin
+// and yaw of the first state), body (= IMU), cameras. SI units, pixels. Memory: 16.6 MiB, reserved by the
+// constructor; no allocation afterwards. When full, the landmark not seen for longest and the oldest IMU
+// samples are dropped. Cost: linear in landmarks, cubic in the dimension of the window (at most 192 columns
+// by default, and 3 for each explicit landmark and plane).
+//
+// Sources: Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR
+// 2015 (window); Usenko et al., "Visual-Inertial Mapping with Non-Linear Factor Recovery", RA-L 2020 (what
+// leaves when); Rosinol, Sattler, Pollefeys, Carlone, "Incremental Visual-Inertial 3D Mesh Generation with
+// Structural Regularities", ICRA 2019 (planes).
 
 #include <Eigen/Core>
 #include <array>
@@ -44,8 +46,8 @@ struct SmootherSettings {
   double pixel_sigma = kTrackPixelSigma;  ///< px, initial value; estimated in flight (pixel_noise.hpp)
   double horizon = 30.0;                  ///< s
   int max_recent = 4;                     ///< newest frames, keyframes or not, that keep all variables
-  int max_motion_keyframes = 5;           ///< keyframes before them that keep velocity and biases
-  int max_keyframes = 12;             ///< these and pose-only ones; max_keyframes + max_recent < kMaxStates
+  int max_motion_keyframes = 5;           ///< keyframes before these that keep velocity and biases
+  int max_keyframes = 12;             ///< including pose-only ones; max_keyframes + max_recent < kMaxStates
   bool estimate_time_offset = false;  ///< camera to IMU clock
   bool estimate_extrinsics = false;   ///< T_body_cam of each camera
   bool estimate_gyro = false;         ///< scale and misalignment of the gyro
@@ -69,9 +71,9 @@ class Smoother {
 
   /// Adds an IMU sample, in order of stamps. Add the samples before a frame before that frame.
   void addImu(const ImuSample& sample) { problem_.imu.push(sample); }
-  /// For what is integrated from now on.
+  /// Sets the noise for samples that are integrated from now on.
   void setNoise(const ImuNoise& noise) { problem_.noise = noise; }
-  /// After reset(), if the following samples have earlier stamps.
+  /// Call after reset() if the following samples have earlier stamps.
   void forgetImu() { problem_.imu.clear(); }
 
   /// Sets the first state, which belongs to the first frame given to `step`.
@@ -83,14 +85,15 @@ class Smoother {
     std::uint32_t rest = 0;  ///< number of the rest at the frame (RestState); 0: in motion
     /// False: the gyro's intrinsics are held in this step.
     bool estimate_gyro = true;
-    int iterations = 2;  ///< largest number
-    /// m, rad: stops after a step in which no pose moves further. Jacobians and robust weights then change by
-    /// less than the noise, and the other parts of a state are linear.
+    int iterations = 2;  ///< largest number of iterations
+    /// m, rad: stops after a step in which no pose moves by more than this. Jacobians and robust weights then
+    /// change by less than the noise, and the other parts of a state are linear.
     double pose_tolerance = 1e-3;
-    /// Largest number of the frame's features used, at least 1: those with the smallest ids, known for
-    /// longest.
+    /// Largest number of the frame's features to use, at least 1: those with the smallest ids, which have
+    /// been tracked for longest.
     int max_features = static_cast<int>(kMaxFeatures);
-    /// Number of keyframes that the window keeps, between 1 and the settings'; it shrinks by two per step.
+    /// Number of keyframes that the window keeps, between 1 and the setting; the window shrinks by at most
+    /// two per step.
     int max_keyframes = static_cast<int>(kMaxStates);
   };
 
@@ -113,7 +116,7 @@ class Smoother {
     return problem_.window.size() > recent ? problem_.window.size() - recent : 0;
   }
 
-  /// Only after the first step.
+  /// The newest state; valid after the first step.
   [[nodiscard]] const WindowState& newest() const { return problem_.window.newest(); }
   [[nodiscard]] const FrameStatistics& statistics() const { return statistics_; }
   /// px, noise of the next frame's observations; kept by reset().
@@ -126,7 +129,7 @@ class Smoother {
   }
   /// The calibration, given or estimated, with sigmas. Cost with an estimate: up to 13 triangular solves.
   [[nodiscard]] CalibrationEstimate calibration();
-  /// Offset in t_imu = t_image + offset: of the calibration, or its estimate.
+  /// Time offset in t_imu = t_image + offset: from the calibration, or estimated.
   [[nodiscard]] Duration timeOffset() const {
     return Duration::fromSeconds(problem_.calibration.timeOffset());
   }
@@ -144,16 +147,16 @@ class Smoother {
 
   // Extra states: call after a step's trim and before the next step. reset() removes them all.
 
-  /// Promotes a landmark to columns of its own, starting at its triangulated position, until no frame sees
-  /// it. Refused: kInvalidInput without such a landmark, kNotReady if it took no part in the last solve,
-  /// kDegenerate at infinity or if its depth is uncertain by more than 10 % (1 sigma), kCapacityReached with
+  /// Promotes a landmark to its own columns, starting at its triangulated position, until no frame sees it.
+  /// Refused: kInvalidInput without such a landmark, kNotReady if it was not in the last solve, kDegenerate
+  /// at infinity or if its depth is uncertain by more than 10 % (1 sigma), kCapacityReached with
   /// kMaxExplicitLandmarks. Ok if it is already promoted.
   Status promote(TrackId id) { return problem_.extras.promote(id); }
   [[nodiscard]] bool promoted(TrackId id) const { return problem_.extras.promoted(id); }
 
-  /// Adds a plane without information; `plane` is its initial value. Its factors count from the step at which
-  /// they determine its normal (extra_table.hpp). It leaves with the next step unless a point is tied to it
-  /// by then, and later with the last point tied to it. None if kMaxPlanes are held.
+  /// Adds a plane without information; `plane` is its initial value. Its factors are used from the step at
+  /// which they determine its normal (extra_table.hpp). It leaves with the next step unless a point is tied
+  /// to it by then, and later with the last tied point. Empty if kMaxPlanes are held.
   std::optional<PlaneId> addPlane(const Plane& plane) { return problem_.extras.addPlane(plane); }
   /// Ties a promoted landmark to a plane with `sigma` [m]. Refused: kInvalidInput without such a landmark or
   /// plane, or if they are already tied; kCapacityReached with kMaxExtraFactors.
@@ -168,12 +171,12 @@ class Smoother {
   void removePointOnPlane(TrackId id, PlaneId plane) { problem_.extras.removePointOnPlane(id, plane); }
   /// Removes a plane with its factors; its part of the prior stays.
   void removePlane(PlaneId plane);
-  /// Cost: three triangular solves.
+  /// The plane with its covariance; empty if there is none. Cost: three triangular solves.
   [[nodiscard]] std::optional<PlaneEstimate> plane(PlaneId plane);
   [[nodiscard]] std::size_t explicitLandmarks() const { return problem_.extras.count(ExtraKind::kLandmark); }
   [[nodiscard]] std::size_t planes() const { return problem_.extras.count(ExtraKind::kPlane); }
 
-  /// The keyframes still in the window, oldest first.
+  /// Outputs the keyframes still in the window, oldest first.
   void flush(FixedVector<KeyframeState, kMaxStates>& left_window);
 
  private:

@@ -34,11 +34,11 @@ struct BodyState {
   [[nodiscard]] Vector15d minus(const BodyState& reference) const;
 };
 
-/// How a state is connected to the state before it.
+/// How a state is linked to the previous one.
 enum class LinkKind : std::uint8_t {
   kNone,              ///< the oldest state with velocity and biases
   kImu,               ///< preintegrated samples
-  kConstantVelocity,  ///< the samples have a gap: velocity is assumed to persist, loosely
+  kConstantVelocity,  ///< the samples have a gap: velocity is assumed constant, with a large sigma
 };
 
 /// A slot of the window.
@@ -47,7 +47,7 @@ struct WindowState {
   Stamp stamp;  ///< on the IMU's clock
   std::uint64_t frame_index = 0;
   bool keyframe = false;
-  std::uint32_t rest = 0;  ///< number of the rest in which the state is; 0: in motion
+  std::uint32_t rest = 0;  ///< number of the rest that the state belongs to; 0: in motion
   bool has_motion = true;  ///< velocity and biases are variables
   BodyState x;
   LinkKind link = LinkKind::kNone;
@@ -59,9 +59,9 @@ struct WindowState {
   ScanTurn scan;                                         ///< rotation during the rows of the image
   int offset = -1;                                       ///< first column in the normal equations
   int factor_offset = -1;                                ///< first column in the factor of the last solve
-  int factor_dimension = 0;                              ///< columns there
+  int factor_dimension = 0;                              ///< number of columns there
   Health health = Health::kInitializing;
-  Matrix15d covariance = Matrix15d::Zero();  ///< marginal, as last computed
+  Matrix15d covariance = Matrix15d::Zero();  ///< marginal covariance, as last computed
   FrameStatistics statistics;
 
   [[nodiscard]] int dimension() const { return has_motion ? kStateDim : kPoseDim; }

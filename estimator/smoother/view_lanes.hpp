@@ -16,7 +16,7 @@
 
 #include "estimator/smoother/vision_factor.hpp"
 
-// Before a loop of fixed count over an array of V, which is kept in registers only if unrolled.
+// Put before a loop of fixed count over an array of V, which stays in registers only if unrolled.
 #ifdef __clang__
 #define SWIFTLET_UNROLL _Pragma("unroll")
 #else
@@ -27,7 +27,7 @@ namespace swiftlet::lanes {
 
 inline constexpr std::size_t kLanes = 4;
 using V = double __attribute__((vector_size(kLanes * sizeof(double))));
-/// All bits set where true, as returned by comparisons of V.
+/// All bits set if true, as returned by comparisons of V.
 using Mask = decltype(V{} < V{});
 
 // Four numbers in memory, aligned or not.
@@ -38,7 +38,7 @@ inline double sum(const V& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 inline bool any(const Mask& m) { return ((m[0] | m[1]) | (m[2] | m[3])) != 0; }
 inline int count(const Mask& m) { return -static_cast<int>((m[0] + m[1]) + (m[2] + m[3])); }
 
-/// Addresses of the numbers of four views. Lanes may be set in any order and may stay unset.
+/// Pointers to the data of four views. Lanes may be set in any order and may stay unset.
 class ViewPointers {
  public:
   void set(std::size_t lane, const CameraPose& camera, const CameraSighting& view) {
@@ -49,7 +49,7 @@ class ViewPointers {
   }
   [[nodiscard]] bool empty() const { return !any(used_); }
   [[nodiscard]] const Mask& used() const { return used_; }
-  /// An unset lane gets the address of a set one, so that every lane computes with regular numbers.
+  /// An unset lane returns the data of a set one, so that every lane computes with regular numbers.
   [[nodiscard]] const CameraPose& camera(std::size_t lane) const { return *camera_[at(lane)]; }
   [[nodiscard]] const CameraSighting& view(std::size_t lane) const { return *view_[at(lane)]; }
 
@@ -62,7 +62,7 @@ class ViewPointers {
   Mask used_{};
 };
 
-/// Four views, and which of them are valid.
+/// Data of four views, and which of them are valid.
 struct ViewGroup {
   V R_cam_world[9];
   V center[3];
@@ -99,8 +99,8 @@ struct ViewGroup {
   void takeRows(const ViewPointers& p);
 };
 
-// As CameraPose::centerAt() and inMiddleRow(). The angle is below 0.2 rad: its sine and cosine by series, to
-// 1e-9.
+// Like CameraPose::centerAt() and inMiddleRow(). The angle is below 0.2 rad; its sine and cosine are computed
+// by series, to 1e-9.
 inline void ViewGroup::takeRows(const ViewPointers& p) {
   V angle[3];
   for (std::size_t l = 0; l < kLanes; ++l) {
@@ -127,8 +127,8 @@ inline void ViewGroup::takeRows(const ViewPointers& p) {
   for (std::size_t i = 0; i < 2; ++i) turn(weight[i], weight[i + 2], weight[i + 4]);
 }
 
-/// Like reprojectionResidual(). If the point is not in front of a view, the measured ray is used instead,
-/// whose residual is zero: its numbers stay finite, and the caller gives it weight zero.
+/// Like reprojectionResidual(). If the point is not in front of a view, the measured ray is used instead: its
+/// residual is zero and all numbers stay finite. The caller must give it weight zero.
 struct Residuals {
   V arm[3];  ///< reference - centre
   V h[3];    ///< ray, camera axes
@@ -200,7 +200,8 @@ class PointSums {
     const V q = counts ? one + kInverseSquaredScale * (r[0] * r[0] + r[1] * r[1]) : one;
     weight = counts ? kInformationScale / q : V{};
     // log a + log b = log ab: one logarithm for many views. A residual is at most 1 / kMinCosine times the
-    // scale of the lens in sigmas, so q is below 1e12 and the product does not overflow beyond the limit.
+    // scale of the lens in sigmas, so q is below 1e12 and the product cannot overflow before the limit is
+    // checked.
     constexpr double kLimit = 1e200;
     product_ *= (q[0] * q[1]) * (q[2] * q[3]);
     if (product_ > kLimit) {

@@ -10,14 +10,14 @@
 namespace swiftlet {
 namespace {
 
-// Nothing is nearer to a flying camera than this.
+// No object is nearer to a flying camera than this.
 constexpr double kMaxInverseDepth = 20.0;  // 1/m
-// Depth taken for a point that one camera saw once.
+// Assumed for a point with a single observation by one camera.
 constexpr double kGuessedInverseDepth = 0.3;  // 1/m
 constexpr double kStepTolerance = 1e-5;
-constexpr double kCostRounding = 1e-9;  // relative, and in squared sigmas: far below what a step can matter
+constexpr double kCostRounding = 1e-9;  // relative, and in squared sigmas: far below any significant change
 
-// Along the first sighting's ray the residuals are nearly linear in the inverse depth alone.
+// Along the ray of the first observation the residuals are nearly linear in the inverse depth.
 void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, LandmarkPoint& point) {
   const Sighting& first = sightings.front();
   const std::size_t c0 = first.camera[0].used ? 0 : 1;
@@ -38,7 +38,7 @@ void triangulateLinearly(RigPoses poses, std::span<const Sighting> sightings, La
       denominator += b.dot(b);
     }
   }
-  // With less than one sigma of parallax over a metre the data say nothing.
+  // With less than one sigma of parallax for a point at one metre, the data do not determine the depth.
   const bool known = denominator > 1.0 * 1.0;
   point.inverse_depth =
       known ? std::clamp(numerator / denominator, 1e-3, kMaxInverseDepth) : kGuessedInverseDepth;

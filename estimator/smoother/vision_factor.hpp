@@ -2,12 +2,12 @@
 // Reprojection of a landmark into a camera with Jacobians, and triangulation of the landmark at the current
 // poses for its structureless elimination.
 //
-// The Jacobian blocks of an observation (pose and point) are taken at the same pose and point. The four
-// unobservable directions (position, yaw) then are null. For this, the linearization of a rolling-shutter
-// camera includes the rotation of its rows but no velocity; the columns of the velocity are left out. Frames:
-// points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel noise. No
-// allocation; triangulation is linear in observations and iterations.
-// Sources: robust weight: Huber, "Robust Statistics", 1981, section 6.3. Equations: docs/smoother.md.
+// The Jacobian blocks of an observation (pose and point) are taken at the same pose and point, so that the
+// four unobservable directions (position, yaw) remain in the null space. For this reason the linearization of
+// a rolling-shutter camera includes the rotation of its rows but no velocity; the columns of the velocity are
+// omitted. Frames: points and centres in the world, rays in the camera. Residuals are in sigmas of the pixel
+// noise. No allocation; triangulation is linear in observations and iterations. Sources: robust weight:
+// Huber, "Robust Statistics", 1981, section 6.3. Equations: docs/smoother.md.
 
 #include <Eigen/Core>
 #include <array>
@@ -50,15 +50,15 @@ struct CameraPose {
   [[nodiscard]] Seen inMiddleRow(const CameraSighting& sighting) const;
 };
 
-/// Poses of the rig at one state. Jacobians are taken at `linearization`: the same, but for the velocity of
-/// rows.
+/// Poses of the rig at one state. Jacobians are taken at `linearization`, which is equal except that rows
+/// have no velocity.
 struct RigPose {
   std::array<CameraPose, kMaxCameras> current;
   std::array<CameraPose, kMaxCameras> linearization;
   Eigen::Vector3d v_world = Eigen::Vector3d::Zero();     ///< m/s, for the time offset and rows
   Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  ///< rad/s, for the time offset and rows
 
-  /// Places camera c at the body's pose `now`. `scan`: of a rolling shutter.
+  /// Places camera c at the body's pose `now`. `scan`: rotation during the rows of a rolling shutter.
   void place(std::size_t c, const SE3& T_body_cam, const SE3& now, double readout, const ScanTurn& scan);
 };
 
@@ -86,8 +86,8 @@ struct SightingJacobians {
   Eigen::Matrix<double, 2, 6> extrinsic;  ///< phi, p of T_body_cam
 };
 
-/// Observation from the pixels of a state's cameras; `pixel_sigma` in px. A camera without a ray for its
-/// pixel is unused.
+/// Makes an observation from the pixels of a state's cameras; `pixel_sigma` in px. A camera whose pixel has
+/// no ray is unused.
 [[nodiscard]] Sighting makeSighting(const Rig& rig, const std::array<bool, kMaxCameras>& seen,
                                     const std::array<Eigen::Vector2f, kMaxCameras>& pixel, double pixel_sigma,
                                     std::uint32_t slot);
@@ -103,14 +103,14 @@ struct SightingJacobians {
                                          const PointBasis& basis, bool with_extrinsic,
                                          SightingJacobians& jacobians);
 
-// Points below this cosine to the measured ray have no useful tangent-plane residual.
+// Below this cosine between a point and the measured ray the tangent-plane residual is useless.
 inline constexpr double kMinCosine = 0.2;
 // Cauchy scale in sigmas: tracks have heavier tails than a normal distribution.
 inline constexpr double kCauchyScale = 2.0;
-// Makes the weighted Hessian the information of the estimate if the noise is normal (2 dof):
+// Makes the weighted Hessian equal to the information of the estimate if the noise is normal (2 dof):
 // E[psi']^2 / (E[psi^2] E[w]) at the scale above (Huber, "Robust Statistics", 1981, section 6.3).
 inline constexpr double kInformationScale = 1.267;
-// Prior on the inverse depth, sigma 30 / m, for points without parallax: too weak to bias points with it.
+// Prior on the inverse depth, sigma 30 / m, for points without parallax: too weak to bias other points.
 inline constexpr double kInverseDepthInformation = 1.0 / (30.0 * 30.0);  // m^2
 
 /// Robust weight (Cauchy, scale 2 sigma) of the norm of a whitened residual, and the corresponding cost, both

@@ -21,7 +21,7 @@ class Window {
   [[nodiscard]] bool empty() const { return order_.empty(); }
   [[nodiscard]] std::size_t size() const { return order_.size(); }
 
-  /// Appends an empty state. Not for a full window.
+  /// Appends an empty state. The window must not be full.
   std::uint8_t add();
   void remove(std::size_t position);
 
@@ -30,7 +30,7 @@ class Window {
   [[nodiscard]] const std::array<WindowState, kMaxStates>& slots() const { return states_; }
   [[nodiscard]] WindowState& inSlot(std::size_t slot) { return states_[slot]; }
   [[nodiscard]] const WindowState& inSlot(std::size_t slot) const { return states_[slot]; }
-  /// The k-th state in time.
+  /// The k-th state in order of time.
   [[nodiscard]] WindowState& operator[](std::size_t k) { return states_[order_[k]]; }
   [[nodiscard]] const WindowState& operator[](std::size_t k) const { return states_[order_[k]]; }
   [[nodiscard]] WindowState& newest() { return states_[order_.back()]; }

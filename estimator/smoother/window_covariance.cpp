@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-// Correlations stay as they are.
+// Scales the sigmas of the pose; correlations do not change.
 void scalePose(double factor, Matrix15d& covariance) {
   const double sigmas = std::sqrt(factor);
   covariance.topRows<kPoseDim>() *= sigmas;
@@ -33,7 +33,7 @@ void WindowCovariance::take(NormalEquations& system, WindowProblem& problem) {
   for (ExtraState& extra : problem.extras.states()) {
     extra.factor_offset = extra.kind == ExtraKind::kNone ? -1 : extra.offset;
   }
-  // The newest state is last: its marginal is the inverse of the factor's last diagonal block.
+  // The newest state has the last columns, so its marginal follows from the factor's last diagonal block.
   const MatrixMap L = factor();
   const int at = problem.window.newest().offset;
   Matrix15d corner = Matrix15d::Zero();

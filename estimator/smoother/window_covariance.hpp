@@ -1,5 +1,5 @@
 #pragma once
-// Covariances of the window from the factor of its last solve, which is kept beyond the system.
+// Covariances of the window from the factor of its last solve, which outlives the system.
 //
 // covariance(a, b) = Y_a^T Y_b with Y = L^-1 of the requested columns. Variables determined by images (poses,
 // calibration, landmarks, planes) are multiplied by the pose variance factor; velocity and biases, determined
@@ -27,7 +27,7 @@ class WindowCovariance {
   void take(NormalEquations& system, WindowProblem& problem);
   [[nodiscard]] MatrixMap factor() { return alignedMap(factor_, dimension_); }
 
-  /// Sets the pose variance factor of further outputs (track_correlation.hpp).
+  /// Sets the pose variance factor for later outputs (track_correlation.hpp).
   void setPoseVarianceFactor(double factor) { factor_of_poses_ = factor; }
 
   /// Covariance of the newest state of the last solve.
@@ -38,7 +38,7 @@ class WindowCovariance {
                               Eigen::Matrix<double, 6, 6>& covariance);
   /// Covariance of the estimated calibration, in its columns (calibration_columns.hpp); false before a solve.
   [[nodiscard]] bool calibration(int dimension, CalibrationMatrix& covariance);
-  /// Zero for an extra state that was not in the last solve.
+  /// Covariance of an extra state; zero if it was not in the last solve.
   [[nodiscard]] Eigen::Matrix3d of(const ExtraState& extra);
   /// A keyframe with its covariance. Velocity and biases of a pose-only keyframe keep the covariance with
   /// which they were marginalized; their correlation with the pose, which was refined since then, is unknown.

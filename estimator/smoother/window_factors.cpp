@@ -12,11 +12,11 @@ namespace swiftlet {
 namespace {
 
 constexpr double kRestPositionSigma = 3e-4;    // m, between two frames at rest: 6 mm/s at 20 Hz
-constexpr double kRestRotationSigma = 3.5e-4;  // rad, likewise
-constexpr double kResidualTime = 5.0;          // s of the window that say how the IMU errs
-constexpr double kSumTime = 1.0;               // s, longer than most turns keep their rate
+constexpr double kRestRotationSigma = 3.5e-4;  // rad, between two frames at rest
+constexpr double kResidualTime = 5.0;  // s, newest part of the window used to measure the IMU's errors
+constexpr double kSumTime = 1.0;       // s, longer than the rate stays constant in most turns
 
-// False where nothing ties the state to the one before it.
+// False if nothing links the state to the previous one.
 bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFactor& factor) {
   const WindowState& i = problem.window[position - 1];
   const WindowState& j = problem.window[position];
@@ -25,7 +25,7 @@ bool motionFactor(const WindowProblem& problem, std::size_t position, MotionFact
                                   : constantVelocityFactor(j.link_duration, problem.noise, i.x, j.x, factor);
 }
 
-// Residuals of one sensor, from newest to oldest. Errors that last show in sums over a second.
+// Residuals of one sensor, added from newest to oldest. Correlated errors show in sums over a second.
 class SensorResiduals {
  public:
   void add(const Eigen::Vector3d& residual, double seconds) {
@@ -41,7 +41,8 @@ class SensorResiduals {
     seconds_ = 0;
     in_sum_ = 0;
   }
-  /// Of a coordinate, singly or in sums, whichever is larger; 0 before the first sum.
+  /// Mean square of a coordinate, of single residuals or of sums, whichever is larger; 0 before the first
+  /// sum.
   [[nodiscard]] double meanSquare() const {
     return sums_ > 0 ? std::max(squares_ / count_, sum_squares_ / sums_) / 3 : 0;
   }
@@ -56,8 +57,9 @@ class SensorResiduals {
   Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();
 };
 
-// Rest is soft: the velocity is near zero, and two frames at rest are at nearly the same pose. It
-// lives and leaves with the motion factor between the two states, so that the prior inherits it.
+// Rest is a soft constraint: the velocity is near zero, and two frames at rest have nearly the same pose. The
+// factor is added and removed together with the motion factor between the two states, so that the prior
+// inherits it.
 Eigen::Matrix<double, kPoseDim, 1> restResidual(const WindowState& i, const WindowState& j) {
   Eigen::Matrix<double, kPoseDim, 1> residual;
   residual.head<3>() =
@@ -69,7 +71,7 @@ Eigen::Matrix<double, kPoseDim, 1> restResidual(const WindowState& i, const Wind
 void addRest(const WindowState& i, const WindowState& j, NormalEquations& system) {
   if (j.rest == 0) return;
   system.addDiagonal(j, 6, j.x.v_world_body, kRestVelocitySigma);
-  if (i.rest != j.rest) return;  // moved in between, though no frame of that may be left
+  if (i.rest != j.rest) return;  // moved in between, although no frame of that motion may be left
   MotionFactor factor;
   factor.residual.setZero();
   factor.jacobian_i.setZero();
@@ -82,7 +84,7 @@ void addRest(const WindowState& i, const WindowState& j, NormalEquations& system
   system.addMotion(factor, i, j);
 }
 
-// Of the states that the prior knows, from its reference. Memory: `work`.
+// Deviation from the reference for the states in the prior. `work` provides the memory.
 VectorMap priorDeviation(WindowProblem& problem, std::vector<double>& work) {
   const Prior& prior = problem.prior;
   VectorMap deviation(work.data(), prior.dimension());
@@ -165,7 +167,7 @@ MotionResiduals motionResiduals(const WindowProblem& problem) {
     rows += static_cast<double>(factor.residual.size());
     if (state.link != LinkKind::kImu) continue;
     if ((problem.window.newest().stamp - state.stamp).seconds() >= kResidualTime) continue;
-    // Whitening is lower triangular: rotation comes first, and is the gyro's alone.
+    // Whitening is lower triangular and rotation comes first, so these residuals depend only on the gyro.
     gyro.add(state.imu_factors.gyro * factor.residual.head<3>(), state.link_duration);
     accel.add(state.imu_factors.accel * factor.residual.segment<3>(6), state.link_duration);
   }
@@ -184,8 +186,8 @@ void addExtras(const WindowProblem& problem, NormalEquations& system) {
   }
 }
 
-// The sigma of a landmark's inverse depth is that along its first ray with everything else held, as
-// triangulation gives it.
+// The sigma of a landmark's inverse depth is along its first ray with everything else held fixed, as in
+// triangulation.
 void finishExtras(WindowProblem& problem, NormalEquations& system) {
   MatrixMap H = system.H();
   for (const ExtraState& extra : problem.extras.states()) {
@@ -234,7 +236,7 @@ WindowCost costOf(WindowProblem& problem, std::vector<double>& work) {
     cost.factors += 0.5 * squares;
   }
   for (const Landmark& landmark : problem.landmarks) {
-    // The point of an explicit one follows its state.
+    // The point of an explicit landmark follows its state.
     if (landmark.in_system)
       cost.factors += PointViews(problem.rig_poses, landmark.views()).cost(landmark.point);
   }

@@ -12,17 +12,18 @@
 
 namespace swiftlet {
 
-/// Returns the cost of the prior, without its constant. `work`: at least as long as the prior's dimension.
+/// Adds the prior and returns its cost without the constant. `work`: at least as long as the prior's
+/// dimension.
 double addPrior(WindowProblem& problem, NormalEquations& system, std::vector<double>& work);
 
-/// The factor between the states at `position` - 1 and `position`, if both have motion, and the rest factor,
-/// if they are at rest.
+/// Adds the factor between the states at `position` - 1 and `position`, if both have motion, and the rest
+/// factor if they are at rest.
 void addMotion(const WindowProblem& problem, std::size_t position, NormalEquations& system);
 
-/// Residuals of all motion in the window at the present states.
+/// Residuals of all motion factors in the window at the current states.
 [[nodiscard]] MotionResiduals motionResiduals(const WindowProblem& problem);
 
-/// Adds explicit landmarks and planes that count.
+/// Adds explicit landmarks, and the factors of planes that are in use.
 void addExtras(const WindowProblem& problem, NormalEquations& system);
 /// After all factors: adds weak information, and sets the sigmas of explicit landmarks' inverse depths.
 void finishExtras(WindowProblem& problem, NormalEquations& system);
@@ -30,8 +31,8 @@ void finishExtras(WindowProblem& problem, NormalEquations& system);
 /// landmarks by the state in the slot.
 void addDepartingExtras(const WindowProblem& problem, const std::uint8_t* slot, NormalEquations& system);
 
-/// Costs of the system and of the prior at the present states and points, with cameras placed; no landmark is
-/// linearized. `work` as above. Cost: less than building the system.
+/// Costs of the system and of the prior at the current states and points, with cameras placed; no landmark is
+/// linearized. `work` as above. Cheaper than building the system.
 struct WindowCost {
   double factors = 0;
   double prior = 0;  ///< without its constant

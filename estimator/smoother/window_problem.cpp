@@ -72,7 +72,7 @@ void WindowProblem::startPrior(const StartState& start) {
   const int at = calibration.dimension() + intrinsics.dimension();
   const double tilt = 1.0 / (start.tilt_sigma * start.tilt_sigma);
   const double gauge = 1.0 / (kGaugeSigma * kGaugeSigma);
-  // The rotation error lives in body axes; the vertical there is R^T z.
+  // The rotation error is in body axes, where the vertical is R^T z.
   const Eigen::Vector3d up = start.state.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   H.block<3, 3>(at, at) = tilt * Eigen::Matrix3d::Identity() + (gauge - tilt) * up * up.transpose();
   for (int k = 0; k < 3; ++k) {

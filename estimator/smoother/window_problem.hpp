@@ -1,6 +1,6 @@
 #pragma once
 // The data of the smoother: states, landmarks, planes, calibration, prior, and their columns in the system.
-// One thread; the parts of the smoother take it by reference and keep no reference.
+// For one thread; the parts of the smoother take it by reference and keep no reference.
 //
 // Columns of a system: calibration, gyro intrinsics, explicit landmarks and planes, states in order of time.
 
@@ -46,7 +46,7 @@ struct WindowProblem {
   GyroIntrinsicsState intrinsics;
   Prior prior;
   std::array<RigPose, kMaxStates> rig_poses;  ///< by slot, from the last placement
-  std::uint64_t oldest_recent_frame = 0;      ///< landmarks not seen since are out of sight
+  std::uint64_t oldest_recent_frame = 0;      ///< landmarks last seen before this frame are out of view
   int dimension = 0;
 
   /// Clears states, landmarks, planes and prior; keeps samples and calibration.
@@ -54,7 +54,7 @@ struct WindowProblem {
   void assignOffsets();
   /// First column in the system of a block of the prior (PriorBlock::slot).
   [[nodiscard]] int offsetOf(std::uint8_t slot) const;
-  /// Places cameras at the states, with the present calibration.
+  /// Places cameras at the states, with the current calibration.
   void placeCameras();
   [[nodiscard]] LandmarkViews viewsOf(std::span<const Sighting> sightings) const;
   /// Sets the prior to that of the first state and the calibration.

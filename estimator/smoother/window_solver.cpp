@@ -8,21 +8,22 @@
 namespace swiftlet {
 namespace {
 
-// First-order bias correction of an increment is exact to about (bias change x duration)^2 / 2.
+// The first-order bias correction of an increment has an error of about (bias change x duration)^2 / 2.
 constexpr double kReintegrateGyro = 5e-4;   // rad/s
 constexpr double kReintegrateAccel = 5e-2;  // m/s^2
 constexpr double kRelativeDamping = 1e-10;
 constexpr int kTriangulationStart = 6;         // iterations for a landmark in its first solve
-constexpr int kTriangulationRestart = 2;       // and for all when states have gone back
-constexpr double kConverged = 1e-4;            // largest step worth another iteration: m, rad, m/s
-constexpr double kCostIncreaseAllowed = 0.02;  // of the factors' cost, before a step is taken back
-constexpr double kOutlierSigmas = 20.0;        // of one sighting, during the solve
+constexpr int kTriangulationRestart = 2;       // iterations for all landmarks after a step was undone
+constexpr double kConverged = 1e-4;            // m, rad, m/s: smallest step worth another iteration
+constexpr double kCostIncreaseAllowed = 0.02;  // relative to the factors' cost; a larger increase undoes the
+                                               // step
+constexpr double kOutlierSigmas = 20.0;        // for single observations, during the solve
 constexpr double kFinalOutlierSigmas = 3.5;
-constexpr int kMaxRejections = 3;  // solves in which a landmark may fail to fit
+constexpr int kMaxRejections = 3;  // number of solves in which a landmark does not fit before it is removed
 
-// Of the 3-vectors that a step is made of, the longest, and the images' times', which come first. Lengths,
-// not components: when the iteration ends must not depend on which way the world's axes point. Without the
-// extra states' columns, `extra` behind the first `calibration`: points far away are not worth an iteration.
+// Length of the longest 3-vector in a step, and of the image times, which come first. Lengths instead of
+// components, so that convergence does not depend on the directions of the world's axes. The `extra` columns
+// after the first `calibration` are skipped: distant points are not worth an iteration.
 double largestStep(const VectorMap& step, int times, int calibration, int extra) {
   double largest = 0;
   for (Eigen::Index k = 0; k < times; ++k) largest = std::max(largest, std::abs(step[k]));
@@ -33,7 +34,7 @@ double largestStep(const VectorMap& step, int times, int calibration, int extra)
   return largest;
 }
 
-// Of the poses' parts alone, the longest.
+// Length of the longest 3-vector among the poses' parts.
 double largestPoseStep(const VectorMap& step, const Window& window) {
   double largest = 0;
   for (std::size_t k = 0; k < window.size(); ++k) {
@@ -43,13 +44,13 @@ double largestPoseStep(const VectorMap& step, const Window& window) {
   return largest;
 }
 
-// The prior's cost has an offset of its own: only differences of the sum mean anything.
+// The prior's cost has an arbitrary constant, so only differences of the sum are meaningful.
 bool rises(const WindowCost& before, const WindowCost& after) {
   const double change = after.factors + after.prior - (before.factors + before.prior);
   return change > kCostIncreaseAllowed * after.factors;
 }
 
-// A failed fit; true when it was the last that is allowed.
+// Counts a failed fit. True if the landmark has failed too often.
 bool reject(WindowProblem& problem, Landmark& landmark) {
   if (++landmark.rejections < kMaxRejections) return false;
   landmark.in_system = false;
@@ -72,13 +73,13 @@ void WindowSolver::reintegrate(WindowProblem& problem) const {
     const Eigen::Vector3d gyro = state.imu.biasFor(problem.intrinsics.now(), previous.x.bias_gyro);
     const bool moved = (gyro - state.imu.biasGyro()).norm() > kReintegrateGyro ||
                        (previous.x.bias_accel - state.imu.biasAccel()).norm() > kReintegrateAccel;
-    // The newest interval but one ended without the sample behind its last image.
+    // When the last interval but one was integrated, the sample after its last image was not available yet.
     if (moved || k + 2 == window.size()) problem.integrateLink(state, previous);
   }
 }
 
-// Landmarks that have no point yet get one; the others move by `iterations` steps of their own, with none
-// they stay where the last step put them. A point behind a camera that saw it is found when sightings are
+// Triangulates landmarks without a point. Others move by `iterations` steps of their own; with 0 they stay
+// where the last step put them. A point behind a camera that observed it is found when observations are
 // checked.
 void WindowSolver::triangulateAll(WindowProblem& problem, int iterations) const {
   for (Landmark& landmark : problem.landmarks) {
@@ -111,7 +112,7 @@ void WindowSolver::build(WindowProblem& problem, NormalEquations& system, bool f
   cost_.factors = system.cost();
 }
 
-// The points' part of the step that was solved for.
+// Applies the landmarks' part of the step by back-substitution.
 void WindowSolver::substitutePoints(WindowProblem& problem, const VectorMap& step) const {
   const StepOfStates states(step, problem.window.slots(), problem.calibration.dimension());
   for (Landmark& landmark : problem.landmarks) {
@@ -129,7 +130,7 @@ void WindowSolver::takeBack(WindowProblem& problem) const {
   triangulateAll(problem, kTriangulationRestart);
 }
 
-// Before any is rejected. A point takes three of the 2 n components of its n views.
+// Call before any observation is rejected. A point fitted to n views absorbs three of their 2 n components.
 double WindowSolver::medianOfNewest(const WindowProblem& problem) {
   squares_.clear();
   const std::uint8_t newest = problem.window.newestSlot();
@@ -171,7 +172,7 @@ Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, Wind
     }
     const WindowCost before = cost_;
     build(problem, system, iteration == 0);
-    // Not the first step: the sightings are others since.
+    // Not after the first step, because observations were rejected since.
     if (iteration > 1 && rises(before, cost_)) {
       takeBack(problem);
       unchecked = false;

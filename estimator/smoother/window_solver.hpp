@@ -2,7 +2,7 @@
 // Gauss-Newton over the window: linearizes all factors, eliminates landmarks, and steps until the step is
 // small.
 //
-// Points move with the step (back-substitution); a step that raises the cost is undone; observations and
+// Points move with the step (back-substitution); a step that increases the cost is undone; observations and
 // landmarks that do not fit are removed by named limits. No allocation after the constructor. Memory: 2.6
 // MiB. Cost: docs/smoother.md.
 
@@ -32,7 +32,8 @@ class WindowSolver {
  private:
   void reintegrate(WindowProblem& problem) const;
   void triangulateAll(WindowProblem& problem, int iterations) const;
-  /// `first` step of a solve: sets the sigmas of points, with the states from the last solve.
+  /// `first`: for the first step of a solve, also sets the sigmas of points, with the states of the last
+  /// solve.
   void build(WindowProblem& problem, NormalEquations& system, bool first);
   void substitutePoints(WindowProblem& problem, const VectorMap& step) const;
   void takeBack(WindowProblem& problem) const;

@@ -5,10 +5,10 @@
 namespace swiftlet {
 namespace {
 
-// Bias walk within one increment is not modelled: longer intervals are not made by merging.
+// Bias walk within one increment is not modelled, so merging must not create longer intervals.
 constexpr double kLongestMergedInterval = 3.0;  // s
-// Parts of states that leave in one step because the window is to become shorter: bounds the time. Each new
-// keyframe makes at most one of either kind leave, so that two bring the window down.
+// Largest number of departures of each kind per step while the window shrinks, which bounds the time. Each
+// new keyframe causes at most one of each kind, so two reduce the window.
 constexpr int kMaxDropsOfAKind = 2;
 
 }  // namespace
@@ -31,7 +31,7 @@ void WindowTrim::trim(const TrimLimits& limits, FixedVector<KeyframeState, kMaxS
     return window.size() > limits.recent &&
            (window.newest().stamp - window[0].stamp).seconds() > limits.horizon;
   };
-  // Each round takes a part of a state away, so there are at most two for each.
+  // Each round removes a part of a state, so there are at most two rounds per state.
   int motions_dropped = 0;
   int keyframes_dropped = 0;
   for (;;) {

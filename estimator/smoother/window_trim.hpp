@@ -3,8 +3,8 @@
 //
 // A frame between two keyframes loses its observations, and its two IMU intervals are merged. An old keyframe
 // loses velocity and biases, later its pose, into the prior (marginalization.hpp). keyframe_choice.hpp
-// chooses the keyframe. Sources: Leutenegger et al., IJRR 2015; Usenko et al., RA-L 2020. Exists for one
-// call.
+// selects the keyframe. Sources: Leutenegger et al., IJRR 2015; Usenko et al., RA-L 2020. Construct it for
+// each call.
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/smoother/marginalization.hpp"
@@ -15,7 +15,7 @@ namespace swiftlet {
 struct TrimLimits {
   std::size_t recent = 0;            ///< newest frames that keep all variables
   std::size_t motion_keyframes = 0;  ///< states before them with velocity and biases
-  std::size_t keyframes = 0;         ///< these and pose-only ones
+  std::size_t keyframes = 0;         ///< including pose-only ones
   double horizon = 0;                ///< s
 };
 
@@ -25,7 +25,7 @@ class WindowTrim {
              Marginalization& marginalization)
       : problem_(problem), system_(system), covariance_(covariance), marginalization_(marginalization) {}
 
-  /// Appends the keyframes that left.
+  /// Removes states and appends the keyframes that left to `left_window`.
   void trim(const TrimLimits& limits, FixedVector<KeyframeState, kMaxStates>& left_window);
 
  private:
