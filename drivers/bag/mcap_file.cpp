@@ -74,6 +74,8 @@ class McapFile final : public BagFile {
   void findEnd();
   void readSummary();
   void walk();
+  /// Takes the record at `at` and moves there to the next; false: it was the last.
+  bool takeRecord(std::uint64_t& at);
   void endEarly(std::uint64_t at);
   void checkData(std::uint64_t data_end, std::uint32_t crc);
   void takeSchema(Bytes content, std::uint64_t place);
@@ -89,6 +91,7 @@ class McapFile final : public BagFile {
 
   FileBytes file_;
   bool finished_ = false;      ///< footer and magic are present at the end
+  bool zero_tail_ = false;     ///< zeros are present at the end, as after a power cut
   std::uint64_t footer_ = 0;   ///< byte where the footer begins
   std::uint64_t summary_ = 0;  ///< byte where the summary begins; 0: none
   bool counted_ = false;       ///< the summary has statistics
@@ -102,6 +105,7 @@ class McapFile final : public BagFile {
   std::array<Unpacked, kChunksKept> kept_;
   std::uint64_t uses_ = 0;
   std::vector<std::uint8_t> packed_;
+  std::vector<std::uint8_t> message_;  ///< decompressed
 };
 
 McapFile::McapFile(const std::string& path, const std::string& name) : BagFile(name), file_(path, name) {
@@ -132,6 +136,7 @@ void McapFile::findEnd() {
   const bool footer =
       reader.u8() == static_cast<std::uint8_t>(Op::kFooter) && reader.u64() == mcap::kFooterContent;
   const Bytes magic = end.last(mcap::kMagic.size());
+  zero_tail_ = std::ranges::all_of(magic, [](std::uint8_t byte) { return byte == 0; });
   if (!footer || !std::equal(magic.begin(), magic.end(), mcap::kMagic.begin())) return;
   finished_ = true;
   summary_ = reader.u64();
@@ -208,10 +213,16 @@ void McapFile::takeStatistics(Bytes content, std::uint64_t place) {
 
 void McapFile::endEarly(std::uint64_t at) {
   if (finished_) fail(at, "a record extends past the data");
-  // Some indexes of the newest chunk may be missing: read its records instead.
+  // Some indexes of the newest chunk may be missing: read its records instead. After a power cut its end may
+  // be zeros; then none of it is used.
   if (chunk_open_) {
     entries_.resize(before_chunk_);
-    scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+    try {
+      scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+    } catch (const InputError&) {
+      entries_.resize(before_chunk_);
+      at = chunks_.back().record;
+    }
   }
   warnings_.push_back(fmt::format(
       "{}: not closed by its recorder, or truncated: {} messages up to byte {} are intact and are read",
@@ -220,42 +231,56 @@ void McapFile::endEarly(std::uint64_t at) {
 
 void McapFile::walk() {
   std::uint64_t at = mcap::kMagic.size();
-  while (true) {
-    const Bytes head = file_.at(at, mcap::kRecordHead);
-    LittleFieldReader reader(head);
-    const auto op = static_cast<Op>(reader.u8());
-    const std::uint64_t length = reader.u64();
-    const std::uint64_t content = at + mcap::kRecordHead;
-    const std::uint64_t end = finished_ ? footer_ : file_.size();
-    if (!reader.ok() || content > end || length > end - content) return endEarly(at);
-    const auto small = static_cast<std::size_t>(length);
-    if (op != Op::kMessageIndex && chunk_open_) closeChunk();
-    switch (op) {
-      case Op::kSchema:
-        takeSchema(file_.at(content, small), at);
-        break;
-      case Op::kChannel:
-        takeChannel(file_.at(content, small), at);
-        break;
-      case Op::kMessage:
-        outside_ = true;
-        takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), kNoChunk, at, at);
-        break;
-      case Op::kChunk:
-        takeChunk(at, content, length);
-        break;
-      case Op::kMessageIndex:
-        takeIndex(file_.at(content, small), at);
-        break;
-      case Op::kDataEnd:
-        if (!finished_) return endEarly(at);
-        if (content + length != (summary_ != 0 ? summary_ : footer_)) fail(at, "the data is truncated");
-        return checkData(at, LittleFieldReader(file_.at(content, small)).u32());
-      default:
-        break;  // attachments, metadata and future kinds
+  try {
+    while (takeRecord(at)) {
     }
-    at = content + length;
+  } catch (const InputError&) {
+    if (!zero_tail_) throw;
+    endEarly(at);
   }
+}
+
+bool McapFile::takeRecord(std::uint64_t& at) {
+  const Bytes head = file_.at(at, mcap::kRecordHead);
+  LittleFieldReader reader(head);
+  const auto op = static_cast<Op>(reader.u8());
+  const std::uint64_t length = reader.u64();
+  const std::uint64_t content = at + mcap::kRecordHead;
+  const std::uint64_t end = finished_ ? footer_ : file_.size();
+  // No record is of kind 0. The data is complete only in a finished file.
+  const bool ends = (op == Op{} && zero_tail_) || (op == Op::kDataEnd && !finished_);
+  if (!reader.ok() || content > end || length > end - content || ends) {
+    endEarly(at);
+    return false;
+  }
+  const auto small = static_cast<std::size_t>(length);
+  if (op != Op::kMessageIndex && chunk_open_) closeChunk();
+  switch (op) {
+    case Op::kSchema:
+      takeSchema(file_.at(content, small), at);
+      break;
+    case Op::kChannel:
+      takeChannel(file_.at(content, small), at);
+      break;
+    case Op::kMessage:
+      outside_ = true;
+      takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), kNoChunk, at, at);
+      break;
+    case Op::kChunk:
+      takeChunk(at, content, length);
+      break;
+    case Op::kMessageIndex:
+      takeIndex(file_.at(content, small), at);
+      break;
+    case Op::kDataEnd:
+      if (content + length != (summary_ != 0 ? summary_ : footer_)) fail(at, "the data is truncated");
+      checkData(at, LittleFieldReader(file_.at(content, small)).u32());
+      return false;
+    default:
+      break;  // attachments, metadata and future kinds
+  }
+  at = content + length;
+  return true;
 }
 
 void McapFile::checkData(std::uint64_t data_end, std::uint32_t crc) {
@@ -301,8 +326,8 @@ void McapFile::takeChunk(std::uint64_t record, std::uint64_t content, std::uint6
 
 /// Reads the records of a chunk that has no index.
 void McapFile::closeChunk() {
-  chunk_open_ = false;
   if (entries_.size() == before_chunk_) scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+  chunk_open_ = false;
 }
 
 void McapFile::takeIndex(Bytes content, std::uint64_t place) {
@@ -411,7 +436,11 @@ Bytes McapFile::read(const BagEntry& entry) {
       channel->second.index != entry.topic || time != static_cast<std::uint64_t>(entry.log_time.ns)) {
     fail(place, "the message index does not point to its message");
   }
-  return head.bytes(head.left());
+  const Bytes body = head.bytes(head.left());
+  // rosbag2 can compress single messages. CDR never begins like a zstd frame.
+  if (topics_[entry.topic].encoding != BagEncoding::kCdr || !isZstd(body)) return body;
+  if (!unpackZstdMessage(body, kMostUnpacked, message_)) fail(place, "a message's zstd data is damaged");
+  return message_;
 }
 
 }  // namespace

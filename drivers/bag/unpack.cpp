@@ -107,7 +107,8 @@ void unpackFile(const std::string& packed, const std::string& to) {
         throw InputError(packed, 0, "", "not enough space to decompress it to " + to,
                          "Set TMPDIR to a folder with space for the decompressed bag");
       }
-      full = target.pos == target.size;
+      // A frame that has ended is all out, even if it fills the room.
+      full = left != 0 && target.pos == target.size;
     }
     read += got;
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "drivers/bag/unpack.hpp"
 #include "tests/drivers/bag/bag_fixture.hpp"
 
 namespace swiftlet {
@@ -80,6 +81,41 @@ TEST_CASE("a cut MCAP file gives what is whole and names the byte", "[mcap]") {
   const std::size_t read = readCuts(file, many, kStep);
   CHECK(read > 30);
   CHECK(read < 40);
+}
+
+TEST_CASE("an MCAP file that ends with zeros after a power cut gives the chunks before them", "[mcap]") {
+  const BagFolder folder;
+  const std::string file = folder.file("a.mcap");
+  const std::vector<PlainMessage> messages = someMessages(40, 100'000);  // four chunks
+  for (const McapPacking packing : {McapPacking::kNone, McapPacking::kZstd}) {
+    test::write(*makeMcapWriter(file, packing), messages);
+    const std::vector<std::uint8_t> whole = test::bytesOf(file);
+    std::size_t most = 0;
+    std::size_t least = messages.size();
+    for (std::size_t cut = whole.size() / 3; cut < whole.size(); cut += whole.size() / 97) {
+      std::vector<std::uint8_t> bytes = whole;
+      std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(cut), bytes.end(), std::uint8_t{0});
+      test::writeBytes(file, bytes);
+      const auto bag = openBag(file);
+      const std::vector<PlainMessage> read = readBack(*bag);
+      REQUIRE(read.size() <= messages.size());
+      CHECK(std::equal(read.begin(), read.end(), messages.begin()));
+      CHECK(bag->warnings().size() == 1);
+      most = std::max(most, read.size());
+      least = std::min(least, read.size());
+    }
+    CHECK(least > 5);
+    CHECK(most > 25);
+  }
+}
+
+TEST_CASE("messages that rosbag2 compressed one by one are read from MCAP files", "[mcap]") {
+  const BagFolder folder;
+  const std::vector<PlainMessage> messages = someMessages(20, 3000);
+  std::vector<PlainMessage> packed = messages;
+  for (PlainMessage& message : packed) message.body = packZstd(message.body);
+  test::write(*makeMcapWriter(folder.file("a.mcap"), McapPacking::kNone), packed);
+  CHECK(readBack(folder.file("a.mcap")) == messages);
 }
 
 TEST_CASE("every flipped byte of an MCAP file is refused with its place, or changes nothing", "[mcap]") {

@@ -165,6 +165,15 @@ TEST_CASE("a bag of several files is one, packed and of other storage too", "[ro
   }
 }
 
+TEST_CASE("a compressed file is whole, however many bytes it unpacks to", "[rosbag2]") {
+  const BagFolder folder;
+  for (const std::size_t size : {131071, 131072, 131073, 262144}) {  // zstd gives at most 131072 at once
+    const std::vector<std::uint8_t> bytes(size, 7);
+    test::writeBytes(folder.file("a.mcap.zstd"), packZstd(bytes));
+    CHECK(test::bytesOf(UnpackedFile(folder.file("a.mcap.zstd")).path()) == bytes);
+  }
+}
+
 TEST_CASE("changes that a killed recorder left beside the file belong to it", "[rosbag2]") {
   const BagFolder folder;
   const std::vector<PlainMessage> messages = someMessages(20, 100);
