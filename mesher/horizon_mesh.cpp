@@ -7,6 +7,9 @@ namespace swiftlet {
 namespace {
 
 constexpr std::uint32_t kNone = TripletTable::kNone;
+// Values of joined_.
+constexpr std::uint32_t kWhole = 0;
+constexpr std::uint32_t kTorn = 1;
 // A landmark is seen through a face if it lies behind the face by more than this share of its distance, this
 // length and this many sigmas. The first two allow for faces that cut the corner of a curved surface.
 constexpr float kBehindShare = 0.05F;
@@ -116,8 +119,10 @@ void HorizonMesh::joinFrame(const FrameMesh& frame) {
     vertex_of_[p] = static_cast<std::uint32_t>(v);
   }
   joined_.clear();
-  for (const FrameFace& face : frame.faces())
-    joined_.insert({face.point[0], face.point[1], face.point[2]}, 0);
+  for (const FrameFace& face : frame.faces()) {
+    const bool torn = face.verdict == FaceVerdict::kTorn;
+    joined_.insert({face.point[0], face.point[1], face.point[2]}, torn ? kTorn : kWhole);
+  }
 }
 
 void HorizonMesh::project(const CameraModel& camera, const SE3& T_cam_world) {
@@ -139,7 +144,7 @@ void HorizonMesh::review(const FrameMesh& frame) {
                                           point_of_[face.vertex[2]]};
     const bool tracked = std::find(points.begin(), points.end(), kNone) == points.end();
     if (longestEdge(face) > kMaxGrowth * face.edge) continue;
-    if (tracked && joined_.find(points) == kNone) {
+    if (tracked && joined_.find(points) != kWhole) {
       ++counters_.replaced;
       continue;
     }

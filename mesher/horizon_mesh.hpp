@@ -3,12 +3,12 @@
 //
 // A vertex is a landmark at its position in the newest window. It is removed with its landmark (never with
 // `keep_all`, the complete mesh of a flight), or if no face uses it. A face is removed if one of its vertices
-// is, if a newer frame that sees all three vertices triangulates them differently, if a landmark is seen
-// through it, or if its longest edge has grown by half. Frames: world, metres. Sources: Rosinol et al., ICRA
-// 2019 (vertices and triplets); Lovi, Birkbeck, Cobzas, Jagersand, "Incremental Free-Space Carving for
-// Real-Time 3D Reconstruction", 3DPVT 2010 (landmarks seen through faces). Memory: 300 bytes per vertex of
-// the capacity, reserved by the constructor. Full: new vertices and faces are refused and counted. Cost:
-// faces that are not tracked completely times points of the frame; 0.5 ms for a window.
+// is, if a newer frame that sees all three vertices triangulates them differently or finds the face torn, if
+// a landmark is seen through it, or if its longest edge has grown by half. Frames: world, metres. Sources:
+// Rosinol et al., ICRA 2019 (vertices and triplets); Lovi, Birkbeck, Cobzas, Jagersand, "Incremental
+// Free-Space Carving for Real-Time 3D Reconstruction", 3DPVT 2010 (landmarks seen through faces). Memory: 300
+// bytes per vertex of the capacity, reserved by the constructor. Full: new vertices and faces are refused and
+// counted. Cost: faces that are not tracked completely times points of the frame; 0.5 ms for a window.
 
 #include <array>
 #include <cstdint>
@@ -31,9 +31,10 @@ struct HorizonLimits {
 };
 
 struct HorizonCounters {
-  std::uint64_t refused = 0;   ///< vertices and faces refused for lack of room
-  std::uint64_t refuted = 0;   ///< faces removed because a landmark was seen through them
-  std::uint64_t replaced = 0;  ///< faces removed because a newer frame joined their vertices differently
+  std::uint64_t refused = 0;  ///< vertices and faces refused for lack of room
+  std::uint64_t refuted = 0;  ///< faces removed because a landmark was seen through them
+  std::uint64_t replaced =
+      0;  ///< faces removed because a newer frame joined their vertices differently or tore them
 };
 
 class HorizonMesh {

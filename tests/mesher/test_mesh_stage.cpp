@@ -246,6 +246,24 @@ TEST_CASE("a newer frame joins the same vertices otherwise") {
   CHECK(stage.horizon().counters().replaced == 1);
 }
 
+TEST_CASE("a face that a newer frame finds torn leaves the horizon") {
+  const Rig rig = pinholeRig();
+  MeshStage stage(rig, {});
+  const auto step = [&](std::uint64_t frame, double far) {
+    MeshScene scene(rig, at(0, 0, 0), frame);
+    scene.add(1, {0, 0, 4});
+    scene.add(2, {0.1, 0, 4});
+    scene.add(3, {0.05, 0.06, far});
+    static_cast<void>(stage.step(scene.input()));
+    REQUIRE(stage.frame().faces().size() == 1);
+    return stage.frame().faces()[0].verdict;
+  };
+  REQUIRE(step(1, 4.20) == FaceVerdict::kKept);
+  REQUIRE(horizonOf(stage)->faces.size() == 1);
+  REQUIRE(step(2, 4.27) == FaceVerdict::kTorn);
+  CHECK(horizonOf(stage)->faces.empty());
+}
+
 TEST_CASE("a face's label changes by majority") {
   const Rig rig = pinholeRig();
   MeshStage stage(rig, {});
