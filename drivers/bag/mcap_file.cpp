@@ -22,8 +22,7 @@ using Bytes = std::span<const std::uint8_t>;
 using mcap::Op;
 
 constexpr std::uint32_t kNoChunk = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint64_t kMostUnpacked = std::uint64_t{1} << 30U;  // largest chunk [bytes]; writers make 1 to
-                                                                  // 4 MiB
+constexpr std::uint64_t kMostUnpacked = std::uint64_t{1} << 30U;  // bytes per chunk; writers make 1 to 4 MiB
 constexpr std::size_t kChunksKept = 4;
 
 std::string_view textOf(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }

@@ -18,7 +18,8 @@ namespace swiftlet {
 namespace {
 
 constexpr int kErrorFramesPerCall = 16;
-// A stamp further from its reading time than this was taken before the wall clock was stepped.
+// A stamp older than this when it is read, or later than the reading, was taken before the wall clock was
+// stepped.
 constexpr Duration kOldest = Duration::fromMilliseconds(10'000);
 constexpr can_err_mask_t kErrors =
     CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL | CAN_ERR_TX_TIMEOUT | CAN_ERR_ACK;

@@ -51,8 +51,7 @@ struct CanBusCounters {
   std::uint64_t controller_overflows = 0;
   std::uint64_t error_passive = 0;
   std::uint64_t went_down = 0;
-  std::uint64_t without_stamp = 0;  ///< frames without a usable kernel stamp; their arrival is the time of
-                                    ///< reading
+  std::uint64_t without_stamp = 0;  ///< frames without a usable kernel stamp, stamped when read
   std::uint64_t reopened = 0;
 };
 

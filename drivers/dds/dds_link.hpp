@@ -115,10 +115,9 @@ struct DdsImage {
 
 struct DdsCounters {
   std::uint64_t written = 0;
-  std::uint64_t refused = 0;     ///< refused by the library because it would have had to wait
-  std::uint64_t complaints = 0;  ///< warnings and errors of the library; a message that is too large gives
-                                 ///< one
-  std::uint64_t images = 0;      ///< images taken
+  std::uint64_t refused = 0;         ///< refused by the library because it would have had to wait
+  std::uint64_t complaints = 0;      ///< warnings and errors of the library; a too large message gives one
+  std::uint64_t images = 0;          ///< images taken
   std::uint64_t images_refused = 0;  ///< not 8 bits, or smaller than declared
   std::uint64_t images_skipped = 0;  ///< overwritten by kKeptImages newer ones before they were taken
 };

@@ -133,8 +133,7 @@ bool TopicReader::open(std::shared_ptr<DdsDomain> domain, TopicType type, const 
 bool TopicReader::takeNext() {
   if (!entities_) return false;
   Entities& e = *entities_;
-  constexpr int kMost = kKeptSamples;  // limit of messages without data, which only say that a publisher has
-                                       // left
+  constexpr int kMost = kKeptSamples;  // messages without data only say that a publisher has left
   for (int looked = 0; looked < kMost; ++looked) {
     const std::uint64_t came = e.came.load(std::memory_order_relaxed);
     void* sample = &e.message;

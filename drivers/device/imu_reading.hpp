@@ -14,8 +14,7 @@ namespace swiftlet {
 struct ImuReading {
   Stamp arrival;                         ///< CLOCK_MONOTONIC, of the first byte or frame of the message
   std::optional<Stamp> device;           ///< the sensor's own clock, unwrapped; empty if it sends none
-  std::optional<std::uint64_t> counter;  ///< the sensor's own sample counter, unwrapped; empty if it sends
-                                         ///< none
+  std::optional<std::uint64_t> counter;  ///< the sensor's own sample counter, unwrapped; empty: none
   Eigen::Vector3d gyro;                  ///< angular rate [rad/s]
   Eigen::Vector3d accel;                 ///< specific force [m/s^2]: +9.81 along the axis that points up
   Duration mean_age = {};  ///< if the values are means: time from the middle of their interval to `device`

@@ -30,8 +30,7 @@ class EdgeGaps {
   Duration period_;
   bool any_ = false;
   Stamp newest_;
-  std::uint32_t sequence_ = 0;  ///< the kernel's count starts at 1: if the first edge is number 3, two were
-                                ///< missed
+  std::uint32_t sequence_ = 0;  ///< the kernel's count starts at 1: a first edge 3 means two missed
   std::uint64_t missed_ = 0;
 };
 

@@ -49,7 +49,7 @@ struct PipelineSource::Pipeline {
 
   /// Reads a sample's caps if they have changed.
   DeviceFault readCaps(GstSample* sample, const PipelineSettings& settings);
-  /// Number of frames since the previous sample; updates `sequence`.
+  /// Number of frames since the previous sample, including lost ones.
   std::uint64_t stepTo(const PipelineSample& sample);
   void letGo(Lent& one) {
     gst_video_frame_unmap(&one.frame);

@@ -52,8 +52,7 @@ struct CameraFacts {
 struct CameraCounters {
   std::uint64_t frames = 0;       ///< delivered
   std::uint64_t missed = 0;       ///< gaps in `sequence`: no buffer was free, or the driver dropped the frame
-  std::uint64_t damaged = 0;      ///< flagged by the driver and returned without being delivered, or not
-                                  ///< decodable
+  std::uint64_t damaged = 0;      ///< flagged by the driver and not delivered, or not decodable
   std::uint64_t too_short = 0;    ///< fewer bytes than the size requires; returned without being delivered
   std::uint64_t stamp_ahead = 0;  ///< stamps later than their arrival
   std::uint64_t requeue_failed = 0;  ///< buffers that could not be returned to the driver

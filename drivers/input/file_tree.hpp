@@ -23,7 +23,7 @@ class FileTree {
   static constexpr std::size_t kMostText = std::size_t{1} << 30U;
   static constexpr std::size_t kMostKept = std::size_t{256} << 20U;
   static constexpr std::size_t kLargestFile = std::size_t{256}
-                                              << 20U;  ///< of texts and pictures; more is none
+                                              << 20U;  ///< bytes; a larger file of a log is damage
 
   FileTree(const FileTree&) = delete;
   FileTree& operator=(const FileTree&) = delete;

@@ -15,8 +15,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kProbed = 50;  // messages per IMU topic; a working sensor is not exactly zero for so
-                                     // long
+constexpr std::size_t kProbed = 50;  // messages per topic; a working sensor is not zero for so long
 
 bool isRead(const BagTopic& topic) { return topic.messages > 0 && topic.encoding != BagEncoding::kOther; }
 

@@ -3,9 +3,9 @@
 //
 // Blank lines, lines that start with '#', and a first line whose first field is not a number (a header
 // without '#') are skipped. CR, surrounding blanks and a byte order mark of UTF-8 are removed; UTF-16 is an
-// InputError. A caller that cannot use a row rejects it: the row is counted, the first one is remembered for
-// the message, and reading continues. finish() throws an InputError that names the first bad row if more than
-// a tenth of the rows (and more than three) are rejected, or if no row is valid.
+// InputError. A caller that cannot use a row rejects it: the row is counted and named in a warning, and
+// reading continues. finish() throws an InputError that names the first bad row if more than a tenth of the
+// rows (and more than three) are rejected, or if no row is valid.
 
 #include <array>
 #include <cstdint>

@@ -69,8 +69,7 @@ inline constexpr std::size_t kImageHeadBytes = 40;  ///< followed by width * hei
 inline constexpr std::size_t kPropagateStepBytes = 16;
 inline constexpr std::size_t kTrackStepBytes = 64;
 inline constexpr std::size_t kSmoothStepBytes = 40;
-inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as written by older programs, without
-                                                                 ///< planes
+inline constexpr std::size_t kSmoothStepBytesBeforePlanes = 32;  ///< as in older programs, without planes
 inline constexpr std::size_t kMeshStepBytes = 24;
 inline constexpr std::size_t kLoopStepBytes = 32;
 inline constexpr std::size_t kMapStepHeadBytes = 80;  ///< followed by depth and labels, if any

@@ -38,8 +38,8 @@ class TrackReader {
   TrackReader(const TrackReader&) = delete;
   TrackReader& operator=(const TrackReader&) = delete;
 
-  /// The next frame; false at the end. Leaves `keyframe` unchanged if the file has no such column. A camera
-  /// counts as present if it has a sighting.
+  /// The next frame; false at the end. `keyframe` is false if the file has no such column. A camera counts as
+  /// present if it has a sighting.
   bool next(TrackedFrame& frame);
 
   /// Whether the file marks keyframes.

@@ -59,7 +59,7 @@ class SampleGaps {
  public:
   struct Step {
     std::uint64_t missing = 0;
-    bool went_back = false;  ///< the clock went back, or a counter went back modulo 16 bits
+    bool went_back = false;  ///< the clock went back, or the counter by less than 2^15 (as 16 bits)
   };
   Step step(std::optional<Stamp> device, std::optional<std::uint64_t> counter);
   /// Median of the clock's last nine steps; empty if there were fewer, or if there is a counter.

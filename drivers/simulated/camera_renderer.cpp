@@ -147,7 +147,7 @@ void CameraRenderer::renderRows(const Instant& instant, std::span<const Sample> 
 void CameraRenderer::renderImage(const SplineTrajectory& trajectory, double seconds,
                                  const RenderSettings& settings, std::vector<float>& radiance) const {
   const MotionState motion = trajectory.at(seconds);
-  // Motion of an object at one metre, in addition to the rotation.
+  // Image motion [px] by rotation, and by translation relative to an object at one metre.
   const double moved = (motion.omega_body.norm() + speedOf(motion)) * settings.exposure * camera_.focal();
   const int count = settings.samples <= 1 ? 1 : moved > 4 * kPixelsPerSample ? kMaxSamples : 4;
   const std::vector<Sample> samples = samplePattern(count);

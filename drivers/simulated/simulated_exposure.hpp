@@ -54,8 +54,7 @@ class SimulatedExposure {
   bool started_ = false;
   GainControl gain_;
   ExposureControl control_;
-  std::array<ExposureSetting, ExposureControl::kActingDelay> coming_{};  ///< in order; the first is for the
-                                                                         ///< next image
+  std::array<ExposureSetting, ExposureControl::kActingDelay> coming_{};  ///< the first is for the next image
 };
 
 }  // namespace swiftlet

@@ -14,8 +14,7 @@ namespace {
 constexpr double kLightSpacing = 0.12;     // m between grid points of the light
 constexpr double kMaxLightPoints = 30000;  // in the whole world
 constexpr double kLightTexels = 20;     // least texels between grid points: coarse paint needs no fine light
-constexpr float kStoredWhite = 215.0F;  // stored value of reflectance 1 in light 1; leaves headroom under
-                                        // lamps
+constexpr float kStoredWhite = 215.0F;  // stored value of reflectance 1 in light 1; headroom under lamps
 
 Texture paintLit(const World& world, std::size_t index, double texel, double light_spacing) {
   const Patch& patch = world.patches()[index];

@@ -317,8 +317,7 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
   const double right = left + kTwinDoor;
   for (const Vector3d& centre : centres) {
     Random random(settings.seed, 42);                                        // the same for both rooms
-    world.setZone(static_cast<std::uint8_t>(&centre - centres.data() + 1));  // separate zones: otherwise
-                                                                             // their light would differ
+    world.setZone(static_cast<std::uint8_t>(&centre - centres.data() + 1));  // so that their light is equal
     addFloorAndCeiling(world, centre, size, Material::kParquet, Material::kPlaster, random.next());
     const auto sides = roomWalls(centre, size);
     constexpr std::array<Material, 4> kLooks{Material::kPlaster, Material::kBrick, Material::kPlaster,

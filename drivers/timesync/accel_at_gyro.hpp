@@ -8,7 +8,7 @@
 // dropped too. All drops are counted. Linear interpolation costs only accelerometer bandwidth, which its rate
 // limits anyway.
 //
-// Threads: one. Memory: fixed, 0.6 s of the fastest sensors. Cost: O(1) a sample.
+// Threads: one. Memory: fixed, 0.6 s of the fastest sensors. Cost: O(1) per sample.
 
 #include <Eigen/Core>
 #include <array>

@@ -26,7 +26,7 @@ constexpr std::int64_t kConfirmSlack = 20'000'000;
 constexpr double kRaisedTolerance = 1e5;  // ns
 constexpr std::size_t kRaisedBins = 8;
 constexpr double kSurprise = 16;
-// Locked: points over at least two seconds, and a small enough uncertainty of the fit.
+// Locked: at least this many bins (2 s of data) over this span, and a small enough uncertainty of the fit.
 constexpr std::size_t kLockBins = 8;
 constexpr std::int64_t kLockSpan = 4'000'000'000;
 constexpr double kLockUncertainty = 2e5;  // ns

@@ -14,8 +14,7 @@ constexpr int kFirstLock = 32;
 constexpr int kNextLock = 8;
 constexpr double kWidest = 0.95;    // periods from the least to the largest D: a slip makes the range wider
 constexpr double kAmbiguous = 0.3;  // periods from the expected lag
-constexpr double kMoved = 0.25;  // periods: largest difference between the mean of few frames and the known
-                                 // lag
+constexpr double kMoved = 0.25;     // periods between the mean of few frames and the known lag
 // Bounds of |D - lag|. A slip by one pulse moves D by one period, or by 0.9 after a pause of the trigger
 // (EdgeTrain accepts 0.1 off the grid). With a scatter of 0.4 periods |D - lag| is then at least 0.5. If
 // stamps scatter less, the bound is narrower, but not below kNarrowest, so that the lag can follow a changing

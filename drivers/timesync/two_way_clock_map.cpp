@@ -21,8 +21,7 @@ constexpr std::int64_t kLockSpan = 4'000'000'000;
 constexpr double kLockUncertainty = 2e5;  // ns
 constexpr double kMostUncertainty = 1e9;  // ns, for the report
 constexpr std::uint64_t kFirstExchanges = 5;
-constexpr std::int64_t kLongestTrip = 10'000'000'000;  // a longer trip is the answer to a request long
-                                                       // forgotten
+constexpr std::int64_t kLongestTrip = 10'000'000'000;  // longer: the answer to a request long forgotten
 
 }  // namespace
 

@@ -15,7 +15,7 @@
 namespace swiftlet {
 namespace {
 
-// A signal may interrupt a call; this many in a row end it.
+// Signals may interrupt a call; after this many interruptions it fails with EINTR.
 constexpr int kMaxInterruptions = 100;
 
 struct Way {
