@@ -23,8 +23,7 @@ constexpr double kDamping = 0.5;
 constexpr double kSmallStep = 0.1;
 /// ...and far from it, where wrong light disturbs it more.
 constexpr double kLargeStep = 0.35;
-constexpr double kStepShare = 0.25;  ///< step as a share of the distance from the target, between these
-                                     ///< bounds
+constexpr double kStepShare = 0.25;  ///< step / distance from the target, between these bounds
 
 constexpr double kTurnMemory = 1.0;  ///< s; a vehicle that turned is likely to turn again
 /// Largest change of the exposure's limit per image [ln]. The brightness stays constant, but some sensors

@@ -4,7 +4,7 @@
 // mixture of words; the carrier detects and discards it (H.-J. Boehm, "Can seqlocks get along with
 // programming language memory models?", MSPC 2012).
 //
-// Memory: sizeof(T) rounded up to 8 bytes. Cost: one plain load or store a word on x86-64; on aarch64
+// Memory: sizeof(T) rounded up to 8 bytes. Cost: one plain load or store per word on x86-64; on aarch64
 // release and acquire words are stlr and ldar, which keep their order.
 
 #include <array>

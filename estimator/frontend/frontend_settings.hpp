@@ -14,10 +14,8 @@ struct FrontendSettings {
   float min_depth = 0.3F;         ///< m, nearest distance searched by stereo matching
   float stereo_gate = 1.5F;       ///< px, largest distance from the epipolar curve
   float motion_gate = 2.0F;  ///< px, largest distance from the epipolar plane of the frame-to-frame motion
-  float keyframe_parallax = 10.F;  ///< px, median since the last keyframe, without rotation, that makes a
-                                   ///< keyframe
-  float keyframe_survival = 0.8F;  ///< share of the last keyframe's tracks still alive below which a frame
-                                   ///< becomes a keyframe
+  float keyframe_parallax = 10.F;  ///< px, median without rotation since the last keyframe, for a new one
+  float keyframe_survival = 0.8F;  ///< new keyframe if a smaller share of its tracks survives
   Duration min_keyframe_interval = Duration::fromMilliseconds(140);
   Duration max_keyframe_interval = Duration::fromMilliseconds(1000);
 };

@@ -61,8 +61,7 @@ Status estimateTilt(std::span<const ImuSample> samples, Stamp at, const ImuNoise
   const double independent = 1.0 + tilt.duration / kAccelerationTime;
   const double manoeuvre =
       std::sqrt((variance + kLeastAcceleration * kLeastAcceleration) / independent) / noise.gravity;
-  const double excess = std::abs(mean.norm() - noise.gravity) / noise.gravity;  // acceleration visible in the
-                                                                                // mean
+  const double excess = std::abs(mean.norm() - noise.gravity) / noise.gravity;  // visible acceleration
   const double sigma = std::hypot(manoeuvre, excess, prior.bias_accel_sigma / noise.gravity);
   tilt.sigma = std::clamp(sigma, kLeastTiltSigma, kMostTiltSigma);
   return okStatus();

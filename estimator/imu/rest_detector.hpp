@@ -115,8 +115,7 @@ class RestDetector {
   bool has_last_ = false;
   Stamp last_;
   Block rest_;                                           // sums over the rest
-  Eigen::Vector3d jump_gyro_ = Eigen::Vector3d::Zero();  // largest difference from the window's mean, per
-                                                         // axis
+  Eigen::Vector3d jump_gyro_ = Eigen::Vector3d::Zero();  // largest difference from the mean, per axis
   Eigen::Vector3d jump_accel_ = Eigen::Vector3d::Zero();
   double drift_gyro_ = 0;
   double drift_accel_ = 0;

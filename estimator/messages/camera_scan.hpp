@@ -4,7 +4,7 @@
 //
 // Points and rays are in camera axes, at the image's stamp (the time of the middle row) or `seconds` after it
 // (Rig::rowTime). The velocity is constant while the rows are read; the rotation is that of ScanTurn. Metres,
-// seconds. Cost: 0.1 us a point. No allocation.
+// seconds. Cost: 0.1 us per point. No allocation.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

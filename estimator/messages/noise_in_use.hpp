@@ -1,5 +1,5 @@
 #pragma once
-// The noise used for an estimate, which may be larger than configured if the flight shows more.
+// The noise used for an estimate: the configured noise, adapted to the errors found in flight.
 
 #include "estimator/messages/track_noise.hpp"
 

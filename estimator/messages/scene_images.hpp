@@ -11,7 +11,7 @@ namespace swiftlet {
 struct SceneImages {
   Stamp stamp;           ///< of the corresponding image of camera 0
   DepthImageView depth;  ///< `depth.depth` null: none
-  ImageView labels;      ///< one value a pixel, in camera 0's raw geometry; empty: none
+  ImageView labels;      ///< one value per pixel, in camera 0's raw geometry; empty: none
 
   [[nodiscard]] bool empty() const { return depth.depth == nullptr && labels.empty(); }
 };

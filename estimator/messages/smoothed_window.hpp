@@ -42,9 +42,8 @@ struct WindowPlane {
 struct SmoothedWindow {
   std::uint32_t epoch = 0;
   std::uint32_t timeline = 0;  ///< TrackedFrame::timeline of the frame it comes from
-  bool started = false;  ///< false: no state in this epoch yet; of the following only the calibration is
-                         ///< valid
-  NavState newest;       ///< stamp on the IMU's clock
+  bool started = false;        ///< false: no state yet in this epoch, only the calibration is valid
+  NavState newest;             ///< stamp on the IMU's clock
   CalibrationEstimate calibration;
   FixedVector<WindowPose, kMaxStates> poses;  ///< in order of time
   FixedVector<WindowLandmark, kMaxLandmarks> landmarks;

@@ -78,8 +78,8 @@ void HealthMonitor::average(const Evidence& evidence, double seconds) {
   const int fit = s.inliers_mono + s.inliers_stereo;
   if (s.known >= kMinSightings)
     share_ = lowPass(share_, std::min(1.0, fit / static_cast<double>(s.known)), seconds);
-  // Track noise larger than configured does not increase the IMU's residuals, but only because it lowers the
-  // weight of tracks.
+  // A larger pixel noise lowers the weight of the tracks and with it the IMU's residuals; the factor corrects
+  // for this.
   const double disagreement = s.imu_residual * s.noise.pixel_sigma / pixel_sigma_;
   imu_square_ = lowPass(imu_square_, disagreement * disagreement, seconds);
   if (seconds > 0) {

@@ -12,7 +12,7 @@
 //  unknown    too few tracks
 // The displacement is the second largest of the medians of the four image quadrants. Forward motion moves all
 // four; a passing person moves one.
-// Memory: 40 kB. Cost: about 10 us a frame.
+// Memory: 40 kB. Cost: about 10 us per frame.
 
 #include <array>
 

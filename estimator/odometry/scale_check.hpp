@@ -10,7 +10,7 @@
 // drift or collapse of the scale is detected too. While a start settles, the smoother corrects the scale of
 // its whole window; until the scale is confirmed, such a correction discards the evidence. Rotations and gyro
 // bias are taken from the smoother, because images determine them. Frames: world, body. Memory: 2 kB. Cost:
-// 12 triangular solves of the window's system a keyframe. Source: Martinelli, "Closed-form solution of
+// 12 triangular solves of the window's system per keyframe. Source: Martinelli, "Closed-form solution of
 // visual-inertial structure from motion", IJCV 2014 (alignment).
 
 #include <Eigen/Core>

@@ -20,8 +20,7 @@ constexpr double kStartGyroBiasSigma = 0.1;    // rad/s
 constexpr double kStartAccelBiasSigma = 0.15;  // m/s^2
 // For this long after a rest the accelerometer gives the speed to a few cm/s.
 constexpr double kRestRemembered = 2;  // s
-constexpr double kCarriedBias = 2.0;   // factor on the sigma at the end of the last epoch: marginal
-                                       // covariances are optimistic
+constexpr double kCarriedBias = 2.0;   // factor on the last sigma: marginal covariances are optimistic
 
 SmootherSettings smootherSettings(const OdometrySettings& settings) {
   SmootherSettings s;

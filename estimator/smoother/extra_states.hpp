@@ -9,7 +9,7 @@
 // The tangent basis belongs to the plane and moves with its normal (a rotation whose z axis is n). A basis
 // computed from n would be discontinuous somewhere, and the prior is expressed in the basis of its reference.
 // Where body states are numbered too (prior, involved variables), slots are numbered from kMaxStates: first
-// the landmarks, then the planes. Memory: 0.4 kB a slot.
+// the landmarks, then the planes. Memory: 0.4 kB per slot.
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

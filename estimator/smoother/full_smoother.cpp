@@ -34,8 +34,7 @@ constexpr double kDampingUp = 10.0;
 // Relative to the diagonal; only against rounding. Images determine a pose much better than the IMU
 // determines the scale of one camera, so with 1e-6 the scale would need a hundred iterations.
 constexpr double kDampingStart = 1e-10;
-constexpr double kFirstMatchGate = 30;  // sigmas: the error that remains after using the loops' relative
-                                        // poses
+constexpr double kFirstMatchGate = 30;  // sigmas, after pulling with the loops' relative poses
 constexpr int kPullIterations = 10;
 constexpr std::size_t kMostSightings = 120;  // per landmark: 20 s at 6 keyframes a second
 constexpr double kPulledEnough = 2e-3;       // m, rad: largest step of a pose

@@ -11,8 +11,7 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kLeastMatches = 6;  // fitting matches per loop: two more than four, which can fit by
-                                          // chance
+constexpr std::size_t kLeastMatches = 6;  // fitting matches per loop; four can fit by chance
 constexpr std::size_t kLeastTies = 3;     // points needed to fix one keyframe relative to another
 constexpr int kTriangulationIterations = 5;
 

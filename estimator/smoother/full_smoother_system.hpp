@@ -115,8 +115,7 @@ struct FullSmoother::System {
 
  private:
   struct Row {
-    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the previous keyframe and the
-                                         ///< keyframe itself
+    std::vector<std::uint32_t> columns;  ///< ascending; the last two are the previous and its own
     std::vector<PaddedBlock> blocks;
   };
   struct Far {

@@ -21,8 +21,7 @@ struct Departure {
   int first = 0;
   int count = 0;                    ///< zero: only extra states
   bool with_motion_factor = false;  ///< includes the motion factor to the next state
-  bool with_landmarks = false;      ///< includes landmarks not seen by recent frames, and the state's
-                                    ///< observations of explicit landmarks
+  bool with_landmarks = false;      ///< unseen by recent frames, and observations of explicit ones
 };
 
 class Marginalization {

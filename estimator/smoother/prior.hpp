@@ -30,8 +30,7 @@ inline constexpr std::size_t kMaxPriorBlocks = kMaxStates + kMaxExtraStates + 2;
 struct PriorBlock {
   static constexpr std::uint8_t kCalibration = 255;
   static constexpr std::uint8_t kGyroIntrinsics = 254;
-  std::uint8_t slot = 0;  ///< slot of a body state; of an extra state, from kMaxStates on; or a constant
-                          ///< above these
+  std::uint8_t slot = 0;  ///< of a body state; of an extra state, from kMaxStates on; or a constant
   int dimension = 0;      ///< the first 6 or 15 columns of a body state, or all columns of others
   int offset = 0;         ///< first column in H and b
   BodyState reference;    ///< of a body state; extra states and calibration store their own

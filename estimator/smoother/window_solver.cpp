@@ -15,8 +15,7 @@ constexpr double kRelativeDamping = 1e-10;
 constexpr int kTriangulationStart = 6;         // iterations for a landmark in its first solve
 constexpr int kTriangulationRestart = 2;       // iterations for all landmarks after a step was undone
 constexpr double kConverged = 1e-4;            // m, rad, m/s: smallest step worth another iteration
-constexpr double kCostIncreaseAllowed = 0.02;  // relative to the factors' cost; a larger increase undoes the
-                                               // step
+constexpr double kCostIncreaseAllowed = 0.02;  // relative to the factors' cost; a larger one undoes the step
 constexpr double kOutlierSigmas = 20.0;        // for single observations, during the solve
 constexpr double kFinalOutlierSigmas = 3.5;
 constexpr int kMaxRejections = 3;  // number of solves in which a landmark does not fit before it is removed
