@@ -17,6 +17,9 @@ constexpr float kFreeShare = 0.98F;
 /// A later voxel that contradicts replaces the earlier if it has at least this share of its weight.
 /// Mismatches have less.
 constexpr float kLaterCounts = 0.25F;
+/// Weight [steps] with which the later counts, however often the earlier was seen: three images that saw all
+/// of the block free (BlockUpdate::carve), or measurements whose mean has a sigma of 6 mm.
+constexpr float kLaterIsSure = 3 * kWeightSteps;
 
 /// Whether one is behind a surface and the other free up to the truncation distance.
 bool contradict(float a, float b) {
@@ -33,9 +36,9 @@ void StoredBlock::setLabels(const LabelBlock* seen) {
 
 bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most_weight, VoxelBlock& to,
               std::size_t to_at) {
-  const bool replaces =
-      static_cast<float>(from.weight[at]) >= kLaterCounts * static_cast<float>(to.weight[to_at]) &&
-      to.weight[to_at] > 0 && contradict(static_cast<float>(to.distance[to_at]), distance);
+  const float needed = std::min(kLaterCounts * static_cast<float>(to.weight[to_at]), kLaterIsSure);
+  const bool replaces = static_cast<float>(from.weight[at]) >= needed && to.weight[to_at] > 0 &&
+                        contradict(static_cast<float>(to.distance[to_at]), distance);
   if (replaces) {
     to.weight[to_at] = 0;
     to.grey[to_at] = 0;

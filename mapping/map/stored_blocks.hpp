@@ -41,7 +41,7 @@ struct StoredBlock {
 
 /// Adds a later voxel of `from`, with this distance [steps], to one of `to`; averages by weight. True if the
 /// later voxel replaced the earlier: one is behind a surface and the other free up to the truncation
-/// distance, so the scene changed. The later one wins unless it has far less weight.
+/// distance, so the scene changed. The later one wins if it is sure or has a quarter of the earlier weight.
 bool addVoxel(const VoxelBlock& from, std::size_t at, float distance, float most_weight, VoxelBlock& to,
               std::size_t to_at);
 

@@ -190,6 +190,24 @@ TEST_CASE("what is free later ends what stood there; a mismatch of little weight
   CHECK(got.weight[offsetOf({1, 1, 1})] == 0);
 }
 
+TEST_CASE("a later pass that is sure ends what stood there, however often that was seen") {
+  for (const int images : {2, 3}) {
+    VoxelVolume volume(sceneSettings());
+    volume.beginChange();
+    BlockBlend blend(volume);
+    StoredBlock thing, free;
+    thing.voxels.distance.fill(-9000);
+    thing.voxels.weight.fill(static_cast<std::uint16_t>(volume.settings().most_weight * kWeightSteps));
+    thing.voxels.grey.fill(10);
+    free.voxels.distance.fill(32767);
+    free.voxels.weight.fill(static_cast<std::uint16_t>(static_cast<float>(images) * kWeightSteps));
+    free.voxels.grey.fill(0);
+    blend.add(thing, {}, kAll);
+    blend.add(free, {}, kAll);
+    CHECK((volume.voxels(volume.find({}))->distance[0] > 0) == (images == 3));
+  }
+}
+
 TEST_CASE("free parts move with their blocks: those of which every voxel's middle falls into one") {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(-1, 1);
