@@ -37,6 +37,11 @@ std::uint32_t apart(std::uint32_t a, std::uint32_t b) { return a > b ? a - b : b
 
 }  // namespace
 
+bool viewsDiffer(const SE3& a, const SE3& b) {
+  const SE3 T_a_b = a.inverse() * b;
+  return T_a_b.translation.norm() > kNodeDistance || turnOf(T_a_b.rotation) > kNodeTurn;
+}
+
 LoopMap::LoopMap(const LoopSettings& settings, const LoopLimits& limits)
     : limits_(limits),
       graph_({static_cast<std::uint32_t>(limits.nodes), static_cast<std::uint32_t>(limits.loops)},

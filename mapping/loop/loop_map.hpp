@@ -44,6 +44,9 @@ inline constexpr double kNodeDistance = 0.25;  // m
 inline constexpr double kNodeTurn = 0.2;       // rad
 inline constexpr double kNodeSeconds = 2;
 
+/// Whether two poses of the body are farther apart than motion makes nodes.
+[[nodiscard]] bool viewsDiffer(const SE3& a, const SE3& b);
+
 /// Frame indices and epochs of kept nodes start here; those of a flight stay below.
 inline constexpr std::uint64_t kKeptFrames = std::uint64_t{1} << 63U;
 inline constexpr std::uint32_t kKeptEpochs = std::uint32_t{1} << 31U;

@@ -216,6 +216,7 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
     // A second loop to the same place adds little. A loop to another place may contradict the first, so that
     // a wrong map does not confirm itself.
     if (tied && view(from, shown) <= 1) continue;
+    if (isRepeated(from, newest)) continue;
     static_cast<void>(made.frames.tryPushBack(candidate.index));
     LoopCandidate told;
     told.similarity = static_cast<double>(candidate.relative);
@@ -254,7 +255,7 @@ bool LoopStage::compareNearest(std::uint32_t to, const LoopEffort& effort, LoopR
   static_cast<void>(made.frames.tryPushBack(map_.node(from).frame));
   LoopCandidate told;
   told.near = true;
-  const bool tied = verify(from, to, told, effort, report);
+  const bool tied = !isRepeated(from, to) && verify(from, to, told, effort, report);
   if (tied) made.near_left = 0;
   return tied;
 }
@@ -271,6 +272,22 @@ double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
   const double distance = (map_.pose(a).translation - map_.pose(b).translation).norm() / kNearDistance;
   if (distance > 1) return distance;
   return std::max(distance, map_.pose(a).rotation.angularDistance(map_.pose(b).rotation) / kNearTurn);
+}
+
+/// Whether a loop between these nodes of two pieces would join the same two views as a loop that is held and
+/// not accepted. Verification repeats its error for the same views, so a vehicle that hovers in front of a
+/// look-alike would collect any number of wrong loops.
+bool LoopStage::isRepeated(std::uint32_t from, std::uint32_t to) const {
+  if (map_.component(from) == map_.component(to)) return false;
+  for (std::uint32_t id = 0; id < map_.loops(); ++id) {
+    const RelativePose<SE3>& held = map_.loopEdge(id);
+    if (!map_.selected(id) && map_.component(held.to) == map_.component(to) && map_.joined(held.from, from) &&
+        !viewsDiffer(map_.pose(held.from), map_.pose(from)) &&
+        !viewsDiffer(map_.pose(held.to), map_.pose(to))) {
+      return true;
+    }
+  }
+  return false;
 }
 
 /// Finds the nearest of the nodes near `to` that it was not compared with. False if there is none.

@@ -17,7 +17,8 @@
 // A kept map (kept_graph.hpp) taken in before the flight is its first piece, and the map frame is that of the
 // kept map. Until loops join the flight to it, each node also tries candidates at other places after the
 // first verified one, because loops to two similar places must both be known to the selection
-// (loop_selection.hpp). MapCorrection::located holds while these loops are accepted.
+// (loop_selection.hpp). Loops from the same view to the same view count once. MapCorrection::located holds
+// while these loops are accepted.
 //
 // A piece that neither odometry nor loops join to others keeps its own world; an epoch of the odometry begins
 // a piece. Frames: world is that of an epoch of the odometry, map that of the first piece. Errors:
@@ -152,6 +153,7 @@ class LoopStage {
   [[nodiscard]] bool nearestNode(std::uint32_t to, std::uint32_t& from) const;
   [[nodiscard]] bool compareNearest(std::uint32_t to, const LoopEffort& effort, LoopReport& report);
   [[nodiscard]] double view(std::uint32_t a, std::uint32_t b) const;
+  [[nodiscard]] bool isRepeated(std::uint32_t from, std::uint32_t to) const;
   [[nodiscard]] bool verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told,
                             const LoopEffort& effort, LoopReport& report);
   void correct(const SmoothedWindow& window);

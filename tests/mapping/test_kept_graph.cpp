@@ -4,6 +4,8 @@
 
 #include <malloc.h>
 
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 
 #include "drivers/input/input_error.hpp"
@@ -111,6 +113,44 @@ TEST_CASE("ten minutes in a kept map take no more memory than the first") {
   for (std::size_t i = 0; i < map.nodes.size(); ++i) {  // none of them left for room
     CHECK(flight.stage->node(i).T_map_body.translation.isApprox(map.nodes[i].T_map_body.translation, 1e-9));
   }
+}
+
+/// What a picture shows upside down: recognized, with a pose that contradicts the map.
+Picture upsideDown(const Picture& picture) {
+  Picture out = picture;
+  for (std::size_t c = 0; c < kMaxCameras; ++c) {
+    std::reverse(out.pixels[c].begin(), out.pixels[c].end());
+    out.image[c].data = out.pixels[c].data();
+  }
+  return out;
+}
+
+TEST_CASE("one view that contradicts a location is one contradiction, however often the flight looks there") {
+  Flight flight = flightIn(mapOf({SE3()}));
+  double seconds = 0;
+  LoopReport report;
+  for (const Picture& picture : pictures().all)
+    report = flight.see(picture, seconds += kSpacing, elsewhere());
+  REQUIRE(report.correction.located);
+  const std::array<Picture, 2> turned{upsideDown(pictures().all[1]), upsideDown(pictures().all[7])};
+  constexpr double kQuick = 0.3;  // s between nodes: what the flight saw itself is not yet a revisit
+  constexpr std::size_t kLooks = 20;
+  for (std::size_t i = 0; i < kLooks; ++i) {
+    CHECK(flight.see(turned[i % 2], seconds += kQuick, elsewhere()).correction.located);
+  }
+  CHECK(flight.stage->loopCount() > report.loops);  // it was recognized
+}
+
+TEST_CASE("a hover in front of one kept view is one witness, however long it lasts") {
+  KeptGraph map = mapOf({SE3()});
+  for (std::size_t i = 1; i < map.nodes.size(); ++i) map.nodes[i].features.clear();
+  Flight flight = flightIn(map);
+  constexpr int kHover = 20;  // nodes
+  double seconds = 0;
+  for (int i = 0; i < kHover; ++i) {
+    CHECK_FALSE(flight.see(pictures().all[1], seconds += kSpacing, elsewhere()).correction.located);
+  }
+  CHECK(flight.stage->counters().kept_loops == 1);  // it did recognize the view
 }
 
 TEST_CASE("where two places of the map look the same it is unknown which of them the flight is at") {
