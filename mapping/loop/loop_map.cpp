@@ -94,6 +94,16 @@ Status LoopMap::addKept(const Node& node, const Link* link, bool held) {
   return status;
 }
 
+void LoopMap::releaseTies(std::uint32_t piece) {
+  for (std::uint32_t id = 0; id < loops(); ++id) {
+    const std::uint32_t a = component(loopEdge(id).from);
+    const std::uint32_t b = component(loopEdge(id).to);
+    if (selected(id) && a != b && (a == piece || b == piece)) static_cast<void>(graph_.release(id));
+  }
+  graph_.search();
+  pieces_.follow(graph_);
+}
+
 Status LoopMap::settle(int iterations, bool& moved) {
   pieces_.follow(graph_);
   const Status status = graph_.settle(iterations, moved);

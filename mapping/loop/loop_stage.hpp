@@ -18,7 +18,8 @@
 // kept map. Until loops join the flight to it, each node also tries candidates at other places after the
 // first verified one, because loops to two similar places must both be known to the selection
 // (loop_selection.hpp). Loops from the same view to the same view count once. MapCorrection::located holds
-// while these loops are accepted.
+// while these loops are accepted. They are released if ten different views in a row near kept nodes are not
+// recognized: a wrong location that nothing contradicts ends too.
 //
 // A piece that neither odometry nor loops join to others keeps its own world; an epoch of the odometry begins
 // a piece. Frames: world is that of an epoch of the odometry, map that of the first piece. Errors:
@@ -153,6 +154,8 @@ class LoopStage {
   [[nodiscard]] bool nearestNode(std::uint32_t to, std::uint32_t& from) const;
   [[nodiscard]] bool compareNearest(std::uint32_t to, const LoopEffort& effort, LoopReport& report);
   [[nodiscard]] double view(std::uint32_t a, std::uint32_t b) const;
+  void checkLocation(std::uint32_t to, double view, bool seen);
+  [[nodiscard]] bool agrees(std::uint32_t id) const;
   [[nodiscard]] bool isRepeated(std::uint32_t from, std::uint32_t to) const;
   [[nodiscard]] bool verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told,
                             const LoopEffort& effort, LoopReport& report);
@@ -169,6 +172,9 @@ class LoopStage {
   std::vector<Comparisons> comparisons_;    ///< by the database's slots
   std::vector<DescriptorMatches> inliers_;  ///< by the map's loop ids
   std::uint32_t epoch_ = 0;
+  std::uint32_t newest_loop_ = 0;  ///< id
+  int missed_ = 0;                 ///< views in a row that a location predicts and that were not recognized
+  SE3 missed_at_;                  ///< the last of them, in the odometry's world
   Pending pending_;
   PlaceKeyframe newest_;
   PlaceStep place_step_;

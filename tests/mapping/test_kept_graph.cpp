@@ -153,6 +153,57 @@ TEST_CASE("a hover in front of one kept view is one witness, however long it las
   CHECK(flight.stage->counters().kept_loops == 1);  // it did recognize the view
 }
 
+TEST_CASE("a location whose predictions fail is taken back, and one view that is hidden is no reason to") {
+  const KeptGraph map = mapOf({SE3()});
+  Flight flight = flightIn(map);
+  double seconds = 0;
+  LoopReport report;
+  constexpr double kQuick = 0.3;  // s between keyframes: what the flight saw itself is not yet a revisit
+  for (const Picture& picture : pictures().all) report = flight.see(picture, seconds += kQuick, elsewhere());
+  REQUIRE(report.correction.located);
+  // Where the location has the kept views the flight sees what is not in the map: their mirror images.
+  std::vector<Picture> strange = pictures().all;
+  for (Picture& picture : strange) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+      for (auto row = picture.pixels[c].begin(); row != picture.pixels[c].end();) {
+        const auto end = row + picture.image[c].width;
+        std::reverse(row, end);
+        row = end;
+      }
+      picture.image[c].data = picture.pixels[c].data();
+    }
+  }
+  constexpr std::array<std::size_t, 2> kTurned{1, 7};  // 0.29 rad apart
+  const auto miss = [&](int views) {
+    for (int i = 0; i < views; ++i) {
+      report = flight.see(strange[kTurned[static_cast<std::size_t>(i) % 2]], seconds += kQuick, elsewhere());
+    }
+  };
+  SECTION("ten views in a row") {
+    miss(9);
+    CHECK(report.correction.located);
+    miss(3);
+    CHECK_FALSE(report.correction.located);
+    CHECK(flight.stage->counters().selected < 3);
+    // Views that agree locate it again.
+    for (const Picture& picture : pictures().all) {
+      report = flight.see(picture, seconds += kSpacing, elsewhere());
+    }
+    CHECK(report.correction.located);
+  }
+  SECTION("none after which the place is recognized") {
+    for (int i = 0; i < 3; ++i) {
+      miss(7);
+      report = flight.see(pictures().all[5], seconds += kQuick, elsewhere());
+    }
+    CHECK(report.correction.located);
+  }
+  SECTION("a hidden view") {
+    for (int i = 0; i < 30; ++i) report = flight.see(strange[1], seconds += kSpacing, elsewhere());
+    CHECK(report.correction.located);
+  }
+}
+
 TEST_CASE("where two places of the map look the same it is unknown which of them the flight is at") {
   SE3 twin;
   twin.translation.x() = 10;
