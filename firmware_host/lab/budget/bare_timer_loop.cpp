@@ -16,7 +16,7 @@ Stamp now() {
 
 void sleepUntil(Stamp stamp) {
   const timespec time{stamp.ns / kNanosPerSecond, stamp.ns % kNanosPerSecond};
-  // A signal ends the sleep early; the time asked for stays the same.
+  // A signal ends the sleep early; the requested time stays the same.
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) != 0) {
   }
 }
@@ -27,7 +27,7 @@ ThreadReport BareTimerLoop::start(const ThreadSettings& settings, Duration perio
   if (!thread_.joinable()) {
     lateness_ = {};
     skipped_ = 0;
-    period_ = std::max(period, Duration{1000});  // 1 us: shorter is no sleep
+    period_ = std::max(period, Duration{1000});  // 1 us; a shorter period is not a sleep
     stop_.store(false, std::memory_order_relaxed);
   }
   return thread_.start(settings, [this] { loop(); });

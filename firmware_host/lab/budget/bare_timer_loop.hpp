@@ -1,10 +1,10 @@
 #pragma once
-// A thread that does nothing but sleep to the next multiple of its period and note how late it woke: what
-// the machine itself costs a real-time thread of that priority, as cyclictest measures it.
+// A thread that only sleeps until the next multiple of its period and notes how late it wakes: the latency
+// that the machine itself causes for a real-time thread of that priority, as measured by cyclictest.
 //
-// Threads: start and stop from one thread; lateness() and the counts after stop.
-// Memory: fixed, allocated by start; the loop allocates nothing.
-// Bounds: stop waits for at most one period (and the machine's lateness).
+// Threads: start and stop from one thread; call lateness() and the counts after stop. Memory: fixed,
+// allocated by start; the loop allocates nothing. stop waits for at most one period (and the machine's
+// lateness).
 
 #include <atomic>
 #include <cstdint>
@@ -24,13 +24,13 @@ class BareTimerLoop {
   BareTimerLoop(const BareTimerLoop&) = delete;
   BareTimerLoop& operator=(const BareTimerLoop&) = delete;
 
-  /// Restarts with empty figures; only reports if it is already running.
+  /// Restarts with empty figures; if already running, only reports.
   ThreadReport start(const ThreadSettings& settings, Duration period = kPeriod);
   void stop();
 
-  /// s, one entry a wake-up.
+  /// s, one entry per wake-up.
   [[nodiscard]] const LatencyHistogram& lateness() const { return lateness_; }
-  /// Periods that had passed before the thread woke for them; each is part of the lateness of the previous
+  /// Periods that had passed before the thread woke for them. Each is part of the lateness of the previous
   /// wake-up and has no entry of its own.
   [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
 

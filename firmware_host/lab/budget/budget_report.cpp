@@ -25,12 +25,12 @@ constexpr int kColumnsPerDecade = 8;
 constexpr int kColumns = kAxisDecades * kColumnsPerDecade;
 constexpr std::string_view kHeights = ".:-=+*#@";
 
-/// s; the upper edge of a histogram column.
+/// s; upper edge of a histogram column.
 double columnEdge(int column) {
   return kAxisStart * std::pow(10.0, static_cast<double>(column + 1) / kColumnsPerDecade);
 }
 
-/// Durations by column: what is below the axis counts in the first, what is above it in the last.
+/// Counts per column: durations below the axis count in the first, above it in the last.
 std::array<std::uint64_t, kColumns> columnsOf(const LatencyHistogram& histogram) {
   std::array<std::uint64_t, kColumns> columns{};
   std::uint64_t below = 0;
@@ -42,7 +42,7 @@ std::array<std::uint64_t, kColumns> columnsOf(const LatencyHistogram& histogram)
   return columns;
 }
 
-/// Heights by the logarithm of the counts: the single late one matters and stays visible.
+/// Column heights are logarithmic in the counts, so that a single late step stays visible.
 std::string picture(const LatencyHistogram& histogram) {
   const auto columns = columnsOf(histogram);
   const auto most = static_cast<double>(*std::max_element(columns.begin(), columns.end()));

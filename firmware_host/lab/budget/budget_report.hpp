@@ -1,9 +1,9 @@
 #pragma once
-// Measured distributions against what is allowed: rows with verdicts, as a table with histograms, as JSON
-// and as JUnit XML.
+// Measured distributions compared with budgets: rows with verdicts, as a table with histograms, as JSON and
+// as JUnit XML.
 //
-// CPU time is what a thread spent itself; wall time is what a reader waited, the machine's own lateness
-// included. They are never mixed in one row. All durations in seconds here, milliseconds in what is printed.
+// CPU time is what a thread used itself; wall time is what a reader waited, including the machine's own
+// lateness. A row never mixes them. Durations are in seconds in the code and in milliseconds in the output.
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -23,13 +23,13 @@ const char* timeKindName(TimeKind kind);
 enum class BudgetVerdict {
   kMet,
   kMissed,
-  kNotMeasured,  ///< a budget without a single measurement: as bad as a miss
-  kShown,        ///< no budget: for comparison only
+  kNotMeasured,  ///< a budget without a measurement: as bad as a miss
+  kShown,        ///< without a budget: for comparison only
 };
 /// "met", "missed", "not measured", "shown".
 const char* verdictName(BudgetVerdict verdict);
 
-/// What is allowed; what is not set is not judged.
+/// Budgets; values that are not set are not judged.
 struct BudgetLimits {
   std::optional<double> p50;
   std::optional<double> p99;
@@ -39,13 +39,13 @@ struct BudgetLimits {
   [[nodiscard]] bool any() const { return p50 || p99 || max || spread; }
 };
 
-/// One figure of a row beside what it may be. Equal is within.
+/// A measured value and its budget. Equal values meet the budget.
 struct BudgetFigure {
   const char* name = "";  ///< "p50", "p99", "max", "spread"
   double measured = 0;
   std::optional<double> allowed;
 
-  // Written so that a NaN is a miss.
+  // Written so that NaN is a miss.
   [[nodiscard]] bool missed() const { return allowed.has_value() && !(measured <= *allowed); }
 };
 
@@ -65,34 +65,34 @@ class BudgetReport {
            const BudgetLimits& allowed = {});
 
   [[nodiscard]] const std::vector<BudgetRow>& rows() const { return rows_; }
-  /// Every row with a budget was measured and is within it, and there is such a row.
+  /// Whether there are rows with a budget, and all of them were measured and meet it.
   [[nodiscard]] bool met() const;
 
-  /// The table; below it one histogram a row on a common logarithmic axis, 1 us to 1 s.
+  /// The table, followed by a histogram per row on a common logarithmic axis from 1 us to 1 s.
   [[nodiscard]] std::string text() const;
   /// {"met", "rows": [{"name", "kind", "count", "mean_ms", "measured": {p50_ms ...}, "allowed": {...},
   /// "verdict", "histogram": [{"from_ms", "count"}]}]}
   [[nodiscard]] nlohmann::ordered_json json() const;
-  /// One test case a figure that has a budget, failures with both values; the table in system-out. `suite`
-  /// names what was replayed.
+  /// One test case per value with a budget; failures give both values; the table is in system-out. `suite`:
+  /// name of what was replayed.
   [[nodiscard]] std::string junit(const std::string& suite) const;
 
  private:
   std::vector<BudgetRow> rows_;
 };
 
-/// What a run measures for its budgets.
+/// Measurements of a run for its budgets.
 struct BudgetMeasurements {
   LatencyHistogram propagate_cpu;
   LatencyHistogram track_cpu;
   LatencyHistogram track_wall;
   LatencyHistogram smooth_cpu;
   LatencyHistogram smooth_wall;
-  bool meshes = false;  ///< the runs mesh
+  bool meshes = false;  ///< whether the runs mesh
   LatencyHistogram mesh_cpu;
   LatencyHistogram image_to_pose_cpu;            ///< all frames
-  LatencyHistogram image_to_pose_cpu_keyframes;  ///< of them, those that became keyframes
-  LatencyHistogram image_to_pose_cpu_frames;     ///< and those that did not
+  LatencyHistogram image_to_pose_cpu_keyframes;  ///< of these, keyframes
+  LatencyHistogram image_to_pose_cpu_frames;     ///< of these, other frames
   LatencyHistogram image_to_pose_wall;           ///< from the arrival of the frame's last image
   LatencyHistogram exposure_to_pose_wall;        ///< from mid-exposure
   LatencyHistogram sample_to_state_cpu;
@@ -100,7 +100,7 @@ struct BudgetMeasurements {
   LatencyHistogram bare_timer_wall;  ///< lateness of a loop that only sleeps, at the track thread's priority
 };
 
-/// The rows of `swiftlet budget`, against the settings' budgets; what has none is shown.
+/// The rows of `swiftlet budget`, judged by the settings' budgets; rows without a budget are only shown.
 BudgetReport evaluateBudgets(const BudgetMeasurements& measured, const BudgetsGroup& allowed);
 
 }  // namespace swiftlet

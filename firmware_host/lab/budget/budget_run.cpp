@@ -21,7 +21,7 @@ void addBoth(LatencyHistogram& sum, const LatencyHistogram& frames, const Latenc
   sum.add(keyframes);
 }
 
-/// The load while it lives; none when it is not wanted.
+/// The load, running during this object's lifetime; none if not requested.
 class Load {
  public:
   explicit Load(const BudgetRequest& request) {
@@ -72,7 +72,7 @@ BudgetResult runBudget(const BudgetRequest& request, const Settings& settings) {
   BudgetResult result;
   nlohmann::ordered_json runs = nlohmann::ordered_json::array();
   Settings flight = settings;
-  flight.full_smoothing = false;  // after the flight, in nobody's budget
+  flight.full_smoothing = false;  // runs after the flight and has no budget
   for (int pass = 0; pass < request.passes; ++pass) {
     for (std::size_t i = 0; i < request.logs.size(); ++i) {
       ReplayRequest replay;

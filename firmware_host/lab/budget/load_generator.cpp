@@ -15,7 +15,7 @@
 namespace swiftlet {
 namespace {
 
-// In the children: no allocation, no lock, nothing of the parent's; kernel calls and arithmetic only.
+// For the child processes: no allocation, no lock, nothing of the parent's; only system calls and arithmetic.
 
 [[noreturn]] void burnCpu() {
   volatile double sum = 0;
@@ -50,13 +50,13 @@ namespace {
   }
 }
 
-/// What a child does before its work; it must not outlive its parent nor inherit priority or handlers.
+/// Prepares a child: it must not outlive its parent nor inherit its priority or handlers.
 void becomeWorker(pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL, 0, 0, 0);
-  if (getppid() != parent) _exit(0);  // the parent was gone before the call above
+  if (getppid() != parent) _exit(0);  // the parent ended before the call above
   const sched_param none{};
   sched_setscheduler(0, SCHED_OTHER, &none);
-  // Ctrl-C goes to the whole group: the parent decides when its load ends.
+  // Ctrl-C goes to the whole group, but the parent decides when its load ends.
   signal(SIGINT, SIG_IGN);
   signal(SIGTERM, SIG_DFL);
   prctl(PR_SET_NAME, "swiftlet-load", 0, 0, 0);
@@ -98,7 +98,7 @@ void LoadGenerator::stop() {
 int LoadGenerator::running() const {
   int count = 0;
   for (const pid_t worker : workers_) {
-    // Looks without reaping: stop still owns the process number.
+    // Checks without reaping: stop still owns the process number.
     siginfo_t info{};
     if (waitid(P_PID, static_cast<id_t>(worker), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
         info.si_pid == 0) {

@@ -1,13 +1,13 @@
 #pragma once
-// A machine that is busy with something else: child processes that burn CPU time and walk memory, in the
-// manner of `stress-ng --cpu N --vm N`, under SCHED_OTHER.
+// Keeps the machine busy: child processes that burn CPU time and walk through memory, like `stress-ng --cpu N
+// --vm N`, under SCHED_OTHER.
 //
-// When: start before memory is locked and threads are made. The children are forked (nothing to find on
-//   disk, no second program); a fork marks all writable memory for copying at the next write, which would
-//   show as page faults of the flight threads. The child touches nothing of its parent's and calls the
-//   kernel only, so a fork beside other threads is safe all the same.
-// End: stop or the destructor kills and reaps them. They die with the thread that started them, however it
-//   ends (PR_SET_PDEATHSIG): start from one that lasts, as main's.
+// Start it before memory is locked and threads are created. The children are forked (no second program is
+// needed). A fork marks all writable memory for copying at the next write, which would appear as page faults
+// of the flight threads. The child uses nothing of its parent's and makes only system calls, so forking is
+// safe even with other threads.
+// End: stop or the destructor kills and reaps the children. They also die with the thread that started them,
+// however it ends (PR_SET_PDEATHSIG), so start from a thread that lasts, such as main's.
 
 #include <sys/types.h>
 
@@ -18,9 +18,9 @@
 namespace swiftlet {
 
 struct LoadSettings {
-  int cpu_workers = 2;     ///< arithmetic without end
-  int memory_workers = 1;  ///< each maps, fills, walks and unmaps a block, without end
-  std::size_t memory_bytes = std::size_t{64} * 1024 * 1024;  ///< of each; beyond the caches
+  int cpu_workers = 2;     ///< endless arithmetic
+  int memory_workers = 1;  ///< each endlessly maps, fills, walks and unmaps a block
+  std::size_t memory_bytes = std::size_t{64} * 1024 * 1024;  ///< of each worker; larger than the caches
 };
 
 class LoadGenerator {
@@ -30,11 +30,11 @@ class LoadGenerator {
   LoadGenerator(const LoadGenerator&) = delete;
   LoadGenerator& operator=(const LoadGenerator&) = delete;
 
-  /// Empty, or why not all of the workers could be made (those made are stopped).
+  /// Empty, or why not all workers could be started (those started are stopped).
   std::string start(const LoadSettings& settings);
   void stop();
 
-  /// Workers that still run.
+  /// Number of workers still running.
   [[nodiscard]] int running() const;
   [[nodiscard]] const std::vector<pid_t>& workers() const { return workers_; }
 

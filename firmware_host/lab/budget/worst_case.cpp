@@ -17,7 +17,7 @@ constexpr double kRenderedSeconds = 6;
 constexpr double kTracksSeconds = 12;
 constexpr double kFastImu = 1000;  // Hz
 
-/// At the limits of tracking and smoothing, and nothing beside them.
+/// Tracking and smoothing at their limits, everything else disabled.
 Settings fullStages(const Settings& settings) {
   Settings most = settings;
   most.odometry.max_features = static_cast<int>(kMaxFeatures);
@@ -43,7 +43,7 @@ class Run : private RunListener {
     static_cast<void>(graph_.track().takeTracks(tracked, graph_.sensors().timeline()));
     runAll(graph_);
   }
-  /// Once; the stages' times.
+  /// Call once; returns the stages' times.
   const StageTable& end() {
     graph_.sensors().endInput();
     runAll(graph_);
@@ -51,8 +51,8 @@ class Run : private RunListener {
     return observer_.statistics().times;
   }
 
-  std::size_t features = 0;   ///< most in a frame
-  std::size_t landmarks = 0;  ///< most in the window
+  std::size_t features = 0;   ///< largest number in a frame
+  std::size_t landmarks = 0;  ///< largest number in the window
 
  private:
   static HostTimes now() { return {wallSeconds(), wallSeconds()}; }

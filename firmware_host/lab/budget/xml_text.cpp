@@ -6,7 +6,7 @@
 namespace swiftlet {
 namespace {
 
-/// Bytes of the UTF-8 character that `text` begins with and that XML may hold; 0: neither.
+/// Length of the UTF-8 character at the start of `text`; 0 if it is invalid or not allowed in XML.
 std::size_t characterBytes(std::string_view text) {
   const auto byte = [&text](std::size_t i) {
     return static_cast<std::uint32_t>(static_cast<unsigned char>(text[i]));
@@ -20,7 +20,7 @@ std::size_t characterBytes(std::string_view text) {
     if (byte(i) >> 6U != 0x2) return 0;
     code = code << 6U | (byte(i) & 0x3FU);
   }
-  // Longer than needed, halves of surrogate pairs, the two that are no characters, beyond Unicode.
+  // Refuses overlong encodings, halves of surrogate pairs, the two non-characters, and codes beyond Unicode.
   constexpr std::uint32_t kLeast[] = {0x80, 0x800, 0x10000};
   const bool allowed = code >= kLeast[bytes - 2] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF) &&
                        code != 0xFFFE && code != 0xFFFF;

@@ -1,6 +1,6 @@
 #pragma once
-// Text made fit for XML 1.0: markup escaped, and what XML cannot hold (control characters, bytes that are no
-// UTF-8) replaced by '?'.
+// Makes text valid for XML 1.0: markup is escaped; what XML cannot contain (control characters, invalid
+// UTF-8) is replaced by '?'.
 
 #include <string>
 #include <string_view>
