@@ -19,13 +19,13 @@ namespace swiftlet {
 namespace {
 
 constexpr double kPointsPerMetre = 72 / 0.0254;
-constexpr double kPrinterMargin = 0.006;  ///< m: that common printers leave white
-constexpr double kRulerWidth = 0.009;     ///< m: ruler and words, along the lower and the left edge
+constexpr double kPrinterMargin = 0.006;  ///< m, left white by common printers
+constexpr double kRulerWidth = 0.009;     ///< m, of ruler and text along the lower and the left edge
 constexpr double kRuler = 0.1;            ///< m
-constexpr double kStep = 0.0005;          ///< m: sizes are read with a ruler
+constexpr double kStep = 0.0005;          ///< m, so that sizes can be read with a ruler
 constexpr double kSmallest = 0.005;       ///< m
 constexpr double kDefaultGap = 0.3;       ///< of a tag's edge, as in Kalibr's boards
-constexpr double kLargestPaper = 5;       ///< m: more no PDF reader takes
+constexpr double kLargestPaper = 5;       ///< m; the limit of PDF readers
 constexpr double kSmallestPaper = 0.08;   ///< m
 constexpr float kTextSize = 7;            ///< points
 
@@ -39,7 +39,7 @@ const Papers& papers() {
   return all;
 }
 
-/// What the library complains of comes as an exception; none of it follows from what a user gives.
+/// Turns errors of the library into an exception; they do not depend on user input.
 void failPdf(HPDF_STATUS error, HPDF_STATUS detail, void* /*unused*/) {
   throw std::runtime_error(fmt::format("libhpdf: error 0x{:04x}, detail {}", error, detail));
 }
@@ -51,7 +51,7 @@ void line(HPDF_Page page, const Eigen::Vector2d& from, const Eigen::Vector2d& to
   HPDF_Page_LineTo(page, points(to.x()), points(to.y()));
 }
 
-/// From `origin` along an axis, with ticks each 10 mm away from the board.
+/// A ruler from `origin` along an axis, with ticks every 10 mm on the side away from the board.
 void ruler(HPDF_Page page, const Eigen::Vector2d& origin, bool upright) {
   constexpr double kTick = 0.002;
   const Eigen::Vector2d along = upright ? Eigen::Vector2d::UnitY() : Eigen::Vector2d::UnitX();
@@ -93,17 +93,17 @@ CalibrationTarget boardForPaper(const BoardLayout& layout, const Eigen::Vector2d
   target.columns = layout.columns;
   target.rows = layout.rows;
   if (target.hasTags()) {
-    // Six rows of tags, as common boards have, and as many columns as the paper's shape asks for.
+    // Six rows of tags, as on common boards, and columns according to the paper's shape.
     target.gap = kDefaultGap;
     if (target.rows == 0) target.rows = 6;
     if (target.columns == 0) {
       target.columns = static_cast<int>(std::lround(target.rows * free.x() / free.y()));
     }
-    // Tags, gaps between and squares around them, and a frame as wide as these.
+    // Tags, the gaps between and the squares around them, and a frame as wide as these.
     const auto edges = [](int count) { return count + kDefaultGap * (count + 3); };
     target.size = std::min(free.x() / edges(target.columns), free.y() / edges(target.rows));
   } else {
-    // 9 x 6: odd and even, so that no turned board looks like it; half a square of white around.
+    // 9 x 6: odd and even, so that no turned board looks the same; half a square of white around.
     if (target.columns == 0) target.columns = 9;
     if (target.rows == 0) target.rows = 6;
     target.size = std::min(free.x() / (target.columns + 2), free.y() / (target.rows + 2));
@@ -129,7 +129,7 @@ std::string boardPdf(const CalibrationTarget& target, const Eigen::Vector2d& pap
   const Eigen::Vector2d margin = 0.5 * (paper + Eigen::Vector2d::Constant(kRulerWidth) - size);
   const Eigen::Vector2d origin = margin - print.low;
   HPDF_Page_SetRGBFill(page, 0, 0, 0);
-  // One path: areas that touch leave no seam.
+  // A single path, so that adjacent areas show no seam.
   for (const BoardRectangle& area : blackAreas(target)) {
     const Eigen::Vector2d low = origin + area.low;
     HPDF_Page_Rectangle(page, points(low.x()), points(low.y()), points(area.high.x() - area.low.x()),

@@ -2,7 +2,7 @@
 // A calibration board as a PDF to print, to scale.
 //
 // One page of the paper's size: the board in its middle, a ruler of 100 mm along the lower edge and one along
-// the left edge to check the print in both directions, and the board's sizes in words. Vectors, no raster.
+// the left edge to check the print in both directions, and the board's sizes as text. Vector graphics.
 // Lengths in metres, the page in points of 1/72 inch.
 
 #include <Eigen/Core>
@@ -12,22 +12,22 @@
 
 namespace swiftlet {
 
-/// Width and height [m] of "A4", "A3", "A2", "A1", "A0", "letter", "tabloid" or "WIDTHxHEIGHT" in mm, as long
-/// as it is wide at least: boards lie across. InputError names `--paper`.
+/// Width and height [m] of "A4", "A3", "A2", "A1", "A0", "letter", "tabloid" or "WIDTHxHEIGHT" in mm, always
+/// in landscape format. InputError naming `--paper`.
 [[nodiscard]] Eigen::Vector2d paperSize(const std::string& name);
 
-/// Columns and rows of a board for a paper; zero: chosen.
+/// Columns and rows of a board on paper; 0: chosen automatically.
 struct BoardLayout {
   TargetKind kind = TargetKind::kAprilGrid;
   int columns = 0;
   int rows = 0;
 };
 
-/// The board that fills the paper: margins for the printer, the white frame and the rulers stay free. Tags
-/// and squares are whole multiples of 0.5 mm. InputError if they would be smaller than 5 mm.
+/// The largest board for the paper, with space for printer margins, the white frame and the rulers. Tags and
+/// squares are multiples of 0.5 mm. InputError if they would be smaller than 5 mm.
 [[nodiscard]] CalibrationTarget boardForPaper(const BoardLayout& layout, const Eigen::Vector2d& paper);
 
-/// The file's bytes; the same board gives the same.
+/// The content of the file; equal boards give equal bytes.
 [[nodiscard]] std::string boardPdf(const CalibrationTarget& target, const Eigen::Vector2d& paper);
 
 }  // namespace swiftlet

@@ -11,13 +11,13 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kSquareWindow = 0.4;  ///< of a square's width: a crossing alone is inside
+constexpr double kSquareWindow = 0.4;  ///< of a square's width, so that only one crossing is inside
 constexpr double kSmallestWindow = 2;  ///< px
 constexpr double kLargestWindow = 6;   ///< px
-constexpr double kMostMoved = 0.25;    ///< of a square's width, from where OpenCV found it
-constexpr double kLeastRefined = 0.9;  ///< of all corners: else the board is covered or no board
+constexpr double kMostMoved = 0.25;    ///< of a square's width, from OpenCV's corner
+constexpr double kLeastRefined = 0.9;  ///< share of corners; with fewer the board is hidden or not a board
 
-/// Inner corners in the image, row 0 at the bottom of the board.
+/// Inner corners in the image; row 0 is at the bottom of the board.
 struct CornerGrid {
   int columns = 0;
   int rows = 0;
@@ -26,7 +26,7 @@ struct CornerGrid {
   [[nodiscard]] const Eigen::Vector2d& at(int column, int row) const {
     return pixels[static_cast<std::size_t>(columns * row + column)];
   }
-  /// To the next corner of the row, or of the column.
+  /// Vector to the next corner in the row or column.
   [[nodiscard]] Eigen::Vector2d alongRow(int column, int row) const {
     return column + 1 < columns ? at(column + 1, row) - at(column, row)
                                 : at(column, row) - at(column - 1, row);
@@ -45,7 +45,7 @@ CornerGrid mirrored(const CornerGrid& grid) {
   return out;
 }
 
-/// A quarter turn for equal columns and rows, else a half turn.
+/// Turns by 90 degrees if columns and rows are equal, otherwise by 180.
 CornerGrid turned(const CornerGrid& grid) {
   CornerGrid out = grid;
   if (grid.columns != grid.rows) {
@@ -95,12 +95,13 @@ std::vector<BoardCorner> findCheckerboard(const ImageView& image, const Calibrat
   if (!cv::findChessboardCorners(grey, cv::Size(target.columns, target.rows), found, flags)) return {};
   CornerGrid grid{target.columns, target.rows, {}};
   for (const cv::Point2f& point : found) grid.pixels.emplace_back(point.x, point.y);
-  // Seen from its front the board's y axis points to the left of its x axis, in an image whose y is down.
+  // Seen from its front, the board's y axis is to the left of its x axis, in an image with y pointing down.
   const Eigen::Vector2d x = grid.alongRow(0, 0);
   const Eigen::Vector2d y = grid.alongColumn(0, 0);
   if (x.x() * y.y() - x.y() * y.x() > 0) grid = mirrored(grid);
 
-  // Orientations from the one whose x axis points most to the right; the first whose colours are right.
+  // Orientations in order of how far the x axis points to the right; the first with the right colours is
+  // taken.
   std::vector<CornerGrid> orientations = {grid};
   for (int turn = 1; turn < (grid.columns == grid.rows ? 4 : 2); ++turn) {
     orientations.push_back(turned(orientations.back()));

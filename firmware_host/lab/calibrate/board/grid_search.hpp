@@ -1,5 +1,5 @@
 #pragma once
-// The two ways in which BoardDetector finds a board (board_detector.hpp). Private to this folder.
+// The two searches of BoardDetector (board_detector.hpp). Private to this folder.
 
 #include <Eigen/Core>
 #include <array>
@@ -17,7 +17,7 @@ class TagGridSearch {
  public:
   explicit TagGridSearch(const CalibrationTarget& target);
 
-  /// `enlarged`: where the image shows no tag, in one twice as large.
+  /// `enlarged`: if the image shows no tag, also search it at twice its size.
   [[nodiscard]] std::vector<BoardCorner> find(const ImageView& image, bool enlarged);
 
  private:
@@ -25,12 +25,12 @@ class TagGridSearch {
 
   /// Refines a predicted tag and compares its cells with its code.
   bool take(const ImageView& image, int tag, const Quad& predicted);
-  /// Takes what can be reached from `tag`, which is taken.
+  /// Takes all tags that can be reached from `tag`, which has been taken.
   void follow(const ImageView& image, int tag);
   [[nodiscard]] bool predict(int from, int tag, Quad& quad) const;
   [[nodiscard]] bool hasCode(const ImageView& image, int tag, const Quad& quad) const;
   [[nodiscard]] std::vector<int> around(int tag) const;
-  /// Leaves the largest connected part.
+  /// Keeps only the largest connected part.
   void keepLargest();
 
   CalibrationTarget target_;

@@ -7,7 +7,7 @@
 namespace swiftlet {
 namespace {
 
-/// To mean zero and mean distance one.
+/// Transform to mean zero and mean distance one.
 Eigen::Matrix3d normalizer(std::span<const PointPair> pairs, Eigen::Vector2d PointPair::*point) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const PointPair& pair : pairs) mean += pair.*point;
@@ -39,7 +39,7 @@ bool fitHomography(std::span<const PointPair> pairs, Eigen::Matrix3d& H) {
     A.noalias() += row.transpose() * row;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(A);
-  // A second direction without residual: the points do not fix the map.
+  // A second direction without residual: the points do not determine the map.
   if (solver.info() != Eigen::Success || !(solver.eigenvalues()[1] > 1e-9)) return false;
   const Eigen::Matrix<double, 9, 1> h = solver.eigenvectors().col(0);
   Eigen::Matrix3d M;

@@ -12,7 +12,7 @@ struct PointPair {
   Eigen::Vector2d to = Eigen::Vector2d::Zero();
 };
 
-/// Four pairs or more. False: points on a line, or not finite.
+/// Needs at least four pairs. False: points are collinear or not finite.
 /// Source: Hartley, Zisserman, Multiple View Geometry, 2004, algorithm 4.2 (normalized DLT).
 [[nodiscard]] bool fitHomography(std::span<const PointPair> pairs, Eigen::Matrix3d& H);
 

@@ -12,7 +12,7 @@
 namespace swiftlet {
 namespace {
 
-/// An image waiting for its search.
+/// An image waiting to be searched.
 struct WaitingImage {
   std::vector<std::uint8_t> pixels;
   ImageView view;
@@ -29,7 +29,7 @@ struct WaitingImage {
   }
 };
 
-/// Searches a batch with all detectors; what is found in an image does not depend on which of them took it.
+/// Searches a batch with all detectors; the result for an image does not depend on which detector takes it.
 void search(const std::vector<WaitingImage>& batch, std::size_t count,
             const std::vector<std::unique_ptr<BoardDetector>>& detectors, std::vector<BoardView>& views) {
   std::atomic<std::size_t> next{0};

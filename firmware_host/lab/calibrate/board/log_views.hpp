@@ -25,17 +25,17 @@ struct LogViewsRequest {
   CalibrationTarget target;
   bool mono = false;                        ///< camera 0 alone
   bool show_progress = false;               ///< on stderr
-  const std::atomic<bool>* stop = nullptr;  ///< set: the log ends here
+  const std::atomic<bool>* stop = nullptr;  ///< set: stop reading here
 };
 
 struct LogViews {
-  std::vector<BoardView> views;    ///< of every image, those without the board too, in the log's order
+  std::vector<BoardView> views;    ///< of every image, including those without the board, in the log's order
   std::vector<ImuSample> samples;  ///< the IMU's own axes; empty: the log has none
   std::size_t camera_count = 0;
   std::array<Eigen::Vector2i, kMaxCameras> image_size{Eigen::Vector2i::Zero(), Eigen::Vector2i::Zero()};
   std::array<std::size_t, kMaxCameras> images{};      ///< searched
-  std::array<std::size_t, kMaxCameras> with_board{};  ///< in which it was found
-  std::vector<std::string> warnings;                  ///< of the log, for the user
+  std::array<std::size_t, kMaxCameras> with_board{};  ///< images with the board
+  std::vector<std::string> warnings;                  ///< about the log, for the user
 };
 
 /// InputError if the log cannot be read.

@@ -15,19 +15,19 @@ using Parameters = Eigen::Matrix<double, kParameters, 1>;
 using Normals = Eigen::Matrix<double, kParameters, kParameters>;
 
 constexpr int kMaxSteps = 25;
-constexpr double kConverged = 2e-3;    ///< px: a fraction of what noise leaves
-constexpr double kFirstBlur = 0.7;     ///< px: a sharp image's pixel and lens
-constexpr double kLeastBlur = 0.3;     ///< px: below it the pixel's own width
-constexpr double kMostBlur = 0.7;      ///< of the radius: more leaves no plain area in the window
-constexpr double kMostTurn = 0.6;      ///< rad that an edge may turn from its guess
+constexpr double kConverged = 2e-3;    ///< px; a fraction of the noise
+constexpr double kFirstBlur = 0.7;     ///< px, for a sharp image: pixel and lens
+constexpr double kLeastBlur = 0.3;     ///< px; below it the pixel's own width dominates
+constexpr double kMostBlur = 0.7;      ///< of the radius; beyond it the window has no plain area
+constexpr double kMostTurn = 0.6;      ///< rad, between an edge and its guess
 constexpr double kLeastContrast = 4;   ///< grey values, half of black to white
 constexpr double kMostResidual = 0.3;  ///< of the contrast
-/// px between fit and window: above a half, so that a corner between two pixels does not move the window
-/// forever.
+/// px between fit and window. More than half a pixel, so that a corner between two pixels does not move the
+/// window forever.
 constexpr double kMostOffCentre = 0.8;
 constexpr double kMostSigma = 0.25;  ///< px
 
-/// erf(x / sqrt 2) and its slope by table: the fit asks 200 times a step.
+/// erf(x / sqrt 2) and its slope from a table: the fit evaluates it 200 times per step.
 class ErrorFunction {
  public:
   ErrorFunction() {
@@ -71,7 +71,7 @@ bool place(const ImageView& image, const Eigen::Vector2d& centre, double radius,
          window.top + window.size <= image.height;
 }
 
-/// Sum of squared residuals; the normal equations where they are asked for.
+/// Sum of squared residuals; also the normal equations if requested.
 double evaluate(const ImageView& image, const Window& window, const Parameters& p, Normals* H,
                 Parameters* g) {
   static const ErrorFunction error_function;
@@ -110,7 +110,7 @@ double evaluate(const ImageView& image, const Window& window, const Parameters& 
       const double k1 = light * p[8] * d1 * e2;
       const double k2 = light * p[8] * e1 * d2;
       Parameters J;
-      // The curvature's part of the first four is a hundredth of them.
+      // The curvature's contribution to the first four is a hundredth and is neglected.
       J[0] = (k1 * s1 + k2 * s2) / blur - p[6] * flat;
       J[1] = (-k1 * c1 - k2 * c2) / blur - p[7] * flat;
       J[2] = -k1 * along1 / blur;
@@ -129,7 +129,7 @@ double evaluate(const ImageView& image, const Window& window, const Parameters& 
   return cost;
 }
 
-/// Shading and contrast from the means of the four areas, the edges as guessed.
+/// Initial shading and contrast from the means of the four areas; edges as guessed.
 Parameters begin(const ImageView& image, const Window& window, const SaddleGuess& guess, double angle1,
                  double angle2) {
   std::array<double, 2> sum{};
@@ -174,7 +174,7 @@ bool refineSaddle(const ImageView& image, const SaddleGuess& guess, Saddle& sadd
     next[4] = std::clamp(next[4], std::log(kLeastBlur), std::log(kMostBlur * guess.radius));
     if (!next.allFinite() || (next.head<2>() - guess.pixel).norm() > guess.radius) return false;
     if ((next.head<2>() - window.centre()).cwiseAbs().maxCoeff() > kMostOffCentre) {
-      // Another window has another sum: begin there, its shading about the new centre.
+      // Another window has another sum: start there, with the shading relative to the new centre.
       if (!place(image, next.head<2>(), guess.radius, window)) return false;
       const double light = 1 + p[6] * change[0] + p[7] * change[1];
       next[5] *= light;
@@ -186,7 +186,7 @@ bool refineSaddle(const ImageView& image, const SaddleGuess& guess, Saddle& sadd
     const double next_cost = evaluate(image, window, next, nullptr, nullptr);
     if (next_cost > cost) {
       damping = std::max(10 * damping, 1e-3);
-      // Noise, or the least blur, keeps the sum from falling: the place is found.
+      // Noise or the minimum blur prevents the sum from decreasing: the position is found.
       done = damping > 1e4 || change.head<2>().norm() < kConverged;
       continue;
     }
@@ -201,7 +201,7 @@ bool refineSaddle(const ImageView& image, const SaddleGuess& guess, Saddle& sadd
     return std::abs(std::remainder(angle - from, 2 * std::numbers::pi));
   };
   if (turned(p[2], angle1) > kMostTurn || turned(p[3], angle2) > kMostTurn) return false;
-  // Between the edges n1 and n2 point to opposite sides.
+  // Between the edges, n1 and n2 point to opposite sides.
   const bool dark = p[8] > 0;
   if (dark != guess.dark_between || std::abs(p[8]) < kLeastContrast) return false;
   const double variance = cost / std::max(1, window.size * window.size - kParameters);

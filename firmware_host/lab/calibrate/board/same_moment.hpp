@@ -1,9 +1,10 @@
 #pragma once
-// Which images of two cameras show the board at the same moment.
+// Whether images of two cameras show the board at the same moment.
 
 namespace swiftlet {
 
-/// s: what triggered cameras' stamps differ by at most. At 1 m/s and 1 m it moves a corner by 0.5 px of 500.
+/// s: largest difference between stamps of triggered cameras. At 1 m/s and 1 m it moves a corner by 0.5 px of
+/// 500.
 inline constexpr double kSameMoment = 1e-3;
 
 }  // namespace swiftlet

@@ -8,12 +8,13 @@
 namespace swiftlet {
 namespace {
 
-/// Wrong cells that are corrected: enough for tags to begin from, with a tenth of the memory of two.
+/// Wrong cells that are corrected: enough to find initial tags, with a tenth of the memory that two would
+/// need.
 constexpr int kCorrectedCells = 1;
 constexpr int kCodeCells = 6;
 constexpr int kBorderCells = 2;
 
-/// Twice as wide and high, linear between pixels: pixel x of the result is x / 2 - 1/4 of the image.
+/// Doubles width and height, linear between pixels: pixel x of the result is x / 2 - 1/4 of the image.
 void enlarge(const ImageView& image, std::vector<std::uint8_t>& out) {
   const int width = 2 * image.width;
   out.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(2 * image.height));
@@ -52,7 +53,7 @@ void widenWhite(const ImageView& image, std::vector<std::uint8_t>& out) {
 }  // namespace
 
 TagFinder::TagFinder() : family_(tag36h11_create()), detector_(apriltag_detector_create()) {
-  // The library's family has a border of one cell; this is this finder's own copy of it.
+  // The library's family has a border of one cell; this copy belongs to this finder alone.
   family_->width_at_border += 2;
   family_->total_width += 2;
   for (std::size_t bit = 0; bit < family_->nbits; ++bit) {
@@ -88,8 +89,7 @@ std::vector<FoundTag> TagFinder::find(const ImageView& image, bool twice) {
     std::array<Eigen::Vector2d, 4> narrow;
     for (std::size_t k = 0; k < 4; ++k) narrow[k] = {detection->p[k][0], detection->p[k][1]};
     for (std::size_t k = 0; k < 4; ++k) {
-      // Each edge lies a pixel too far inside, since white was widened. The library's pixel (0,0) begins at
-      // 0.
+      // Widening white moved each edge inward by one pixel. The library's pixel (0,0) begins at 0.
       const Eigen::Vector2d outward = (narrow[k] - narrow[(k + 1) % 4]).stableNormalized() +
                                       (narrow[k] - narrow[(k + 3) % 4]).stableNormalized();
       tag.corners[k] = scale * (narrow[k] + outward) - Eigen::Vector2d::Constant(0.5);

@@ -1,6 +1,6 @@
 #pragma once
-// Tags of Kalibr's boards by libapriltag: tag36h11 with a black border of two cells. Their corners are good
-// to a pixel or two. Threads: one. Private to this folder.
+// Finds tags of Kalibr's boards with libapriltag: tag36h11 with a black border of two cells. Corners are
+// accurate to a pixel or two. Threads: one. Private to this folder.
 
 #include <apriltag/apriltag.h>
 
@@ -25,10 +25,10 @@ class TagFinder {
   TagFinder& operator=(const TagFinder&) = delete;
   ~TagFinder();
 
-  /// By rising id; ids that are seen twice are left out. `twice`: in the image enlarged by two.
+  /// Ordered by id; ids seen twice are omitted. `twice`: searches the image enlarged by two.
   [[nodiscard]] std::vector<FoundTag> find(const ImageView& image, bool twice);
 
-  /// The 36 cells of a tag's code, rows from above: 1 white, -1 black.
+  /// The 36 cells of a tag's code, rows from the top: 1 white, -1 black.
   using Code = Eigen::Matrix<double, 36, 1>;
   [[nodiscard]] Code code(int id) const;
 

@@ -13,15 +13,15 @@ namespace {
 constexpr double kBorder = 0.2;     ///< of a tag's edge
 constexpr double kWindow = 0.65;    ///< of the distance to the next edge, which blur widens
 constexpr double kLeastRadius = 2;  ///< px
-constexpr double kMostRadius = 6;   ///< px: beyond it a lens bends edges and the time grows
+constexpr double kMostRadius = 6;   ///< px; beyond it a lens bends edges and the time grows
 constexpr double kSearch = 0.1;     ///< of a tag's edge, around a prediction: half the way to the next cell
 constexpr double kMostSearch = 8;   ///< px
-constexpr double kLeastEdge = 8;    ///< px: below it a cell of a tag is less than a pixel
+constexpr double kLeastEdge = 8;    ///< px; below it a cell of a tag is less than a pixel
 constexpr double kLeastAgreement = 0.7;  ///< correlation of cells and code; two codes have at most 0.4
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Grey value between pixels; the caller asks inside the image.
+/// Interpolated grey value; `at` must be inside the image.
 double sample(const ImageView& image, const Eigen::Vector2d& at) {
   const double x = std::clamp(at.x(), 0.0, image.width - 1.001);
   const double y = std::clamp(at.y(), 0.0, image.height - 1.001);
@@ -35,18 +35,19 @@ double sample(const ImageView& image, const Eigen::Vector2d& at) {
          down * ((1 - right) * lower[0] + right * lower[1]);
 }
 
-/// How much a place is a crossing of this polarity: the darker areas beside the brighter, `reach` px away.
+/// How well a point matches a crossing of this polarity: contrast between the darker and brighter areas
+/// `reach` px away.
 double crossing(const ImageView& image, const Eigen::Vector2d& at, const Eigen::Vector2d& dark,
                 const Eigen::Vector2d& bright) {
   const double d1 = sample(image, at + dark);
   const double d2 = sample(image, at - dark);
   const double b1 = sample(image, at + bright);
   const double b2 = sample(image, at - bright);
-  // The worst pair decides: an edge has one pair of equal areas.
+  // The worst pair decides: at a plain edge, one pair of areas is equal.
   return std::min(b1, b2) - std::max(d1, d2);
 }
 
-/// The middle of the places within `reach` that are most like a crossing.
+/// The mean position of the best matches within `reach`.
 Eigen::Vector2d searchCrossing(const ImageView& image, const SaddleGuess& guess, double reach) {
   const Eigen::Vector2d e1 = guess.edge1.normalized();
   const Eigen::Vector2d e2 = guess.edge2.normalized();
@@ -156,7 +157,7 @@ bool TagGridSearch::predict(int from, int tag, Quad& quad) const {
     }
   };
   add(from);
-  // What is beside both is nearest to where it is wanted.
+  // Tags adjacent to both are nearest to the prediction.
   const std::vector<int> beside = around(tag);
   for (const int known : beside) {
     if (known != from) add(known);
@@ -193,7 +194,7 @@ void TagGridSearch::keepLargest() {
         const auto index = static_cast<std::size_t>(other);
         Quad quad;
         if (!taken_[index] || seen[index] || !predict(part[next], other, quad)) continue;
-        // Of two boards in one image only one is followed: their parts do not predict each other.
+        // If an image shows two boards only one is followed, because their parts do not predict each other.
         const double edge = (quad[0] - quad[2]).norm();
         bool agrees = true;
         for (std::size_t k = 0; k < 4; ++k) {

@@ -10,9 +10,8 @@
 
 namespace swiftlet {
 
-/// T_cam_board: homography of the bearings (any angle from the axis), then Gauss-Newton on the pixels,
-/// robust. Nothing for fewer than six corners, corners on a line, or a fit that leaves more than `most_rms`
-/// [px].
+/// T_cam_board: homography of the bearings (at any angle from the axis), then robust Gauss-Newton on the
+/// pixels. Empty for fewer than six corners, collinear corners, or a fit with more than `most_rms` [px].
 std::optional<SE3> boardPose(const CalibrationTarget& target, const CameraModel& lens, const BoardView& view,
                              double most_rms);
 

@@ -18,10 +18,10 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kStartViews = 30;
-constexpr std::size_t kMostViews = 200;  ///< sigmas fall with the root of them; more cost time and a page
-constexpr std::size_t kFewestPairs = 3;  ///< moments of both cameras that a transform needs
-constexpr double kStrongEvidence = 10;   ///< of the information criterion
-constexpr double kFarOff = 5;            ///< sigmas: a view that is worse than this is another thing
+constexpr std::size_t kMostViews = 200;  ///< sigmas fall with its square root; more cost time and page size
+constexpr std::size_t kFewestPairs = 3;  ///< moments seen by both cameras that a transform needs
+constexpr double kStrongEvidence = 10;   ///< difference of the information criterion
+constexpr double kFarOff = 5;            ///< sigmas; a worse view shows something else
 
 struct Choice {
   std::optional<LensFit> fit;
@@ -74,7 +74,7 @@ Choice chooseModel(const CameraInput& input, const std::vector<Moment>& moments,
   return choice;
 }
 
-/// Of the transforms of single moments the one that the others are nearest to.
+/// Of the transforms from single moments, the one nearest to the others.
 std::optional<SE3> firstTransform(const CameraInput& input, const std::vector<Moment>& moments,
                                   const std::array<CameraModel, kMaxCameras>& lens, double most_rms) {
   std::vector<const Moment*> both;
@@ -132,7 +132,7 @@ Eigen::MatrixXd covarianceOf(const CameraBundle& bundle, double sigma) {
   return noise * noise * (scale.asDiagonal() * inverse * scale.asDiagonal());
 }
 
-/// The lenses from every other view. False where the views are too few for it.
+/// Solves the lenses from every other view. False if there are too few views.
 bool solveHalves(const CameraBundle& bundle, CameraSolution& solution, CameraEvidence& evidence) {
   for (std::size_t half = 0; half < 2; ++half) {
     CameraBundle part = bundle;

@@ -12,10 +12,10 @@ namespace swiftlet {
 namespace {
 
 constexpr int kMostSteps = 60;
-constexpr double kSmallestGain = 1e-9;  ///< of the cost, that ends the solution
+constexpr double kSmallestGain = 1e-9;  ///< relative decrease of the cost that ends the solution
 constexpr double kMostDamping = 1e8;
-constexpr double kOutlierSigmas = 4;  ///< of two axes: exceeded by chance once in 3000 corners
-constexpr double kNoPixel = 100;      ///< px: what counts for a corner that the lens does not reach
+constexpr double kOutlierSigmas = 4;  ///< over two axes: exceeded by chance once in 3000 corners
+constexpr double kNoPixel = 100;      ///< px, residual of a corner that the lens cannot project
 constexpr int kMostRounds = 12;
 constexpr std::size_t kFewestUsed = 6;  ///< corners of a view
 /// Median length of two normal axes, in sigmas.
@@ -38,8 +38,8 @@ double medianOf(std::vector<double> values) {
 }  // namespace
 
 struct CameraBundle::Block {
-  Eigen::MatrixXd H;               ///< globals
-  Eigen::Matrix<double, -1, 6> W;  ///< globals by pose
+  Eigen::MatrixXd H;               ///< between globals
+  Eigen::Matrix<double, -1, 6> W;  ///< between globals and pose
   Matrix6d V = Matrix6d::Zero();
   Eigen::VectorXd g;
   Vector6d pose_gradient = Vector6d::Zero();
@@ -191,7 +191,7 @@ bool CameraBundle::solve(Terms terms, double robust_scale) {
           g[held] = 0;
         }
       }
-      // To a diagonal of one: the distortion's terms differ by powers of the image's width.
+      // Scaled to a diagonal of one: the distortion terms differ by powers of the image's width.
       const Eigen::VectorXd scale = S.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
       const Eigen::MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
       const Eigen::VectorXd globals = scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(g)));
@@ -212,7 +212,7 @@ bool CameraBundle::solve(Terms terms, double robust_scale) {
           better = true;
           continue;
         }
-        // At the minimum rounding alone decides.
+        // At the minimum, only rounding decides.
         if (after - before < kSmallestGain * before && damping < 1) return true;
       }
       damping *= 10;

@@ -1,14 +1,13 @@
 #pragma once
-// Lenses, the transform between two cameras and a board pose a view, all solved together.
+// Solves lenses, the transform between two cameras and a board pose per view together.
 //
 // Minimizes the squares of (seen - predicted) pixels over
-//   globals: of each camera fx fy cx cy and four of the distortion; of two cameras T_cam1_cam0 (rotation
-//   vector
-//            on the right, then translation),
-//   views:   T_cam0_board, likewise,
+//   globals: of each camera fx fy cx cy and four distortion terms; of two cameras T_cam1_cam0 (rotation
+//            vector on the right, then translation),
+//   views:   T_cam0_board, in the same form,
 // by Levenberg-Marquardt on the globals after the views are eliminated (Schur complement). The same blocks
-// give the information of the globals, from which views are chosen and covariances follow. Cost of a step: 2
-// x 30^2 multiplications a corner; 100 views of two cameras 20 ms. Threads: one. Source: Triggs, McLauchlan,
+// give the information on the globals, used for choosing views and for covariances. Cost of a step: 2 x 30^2
+// multiplications per corner; 20 ms for 100 views of two cameras. Threads: one. Source: Triggs, McLauchlan,
 // Hartley, Fitzgibbon, "Bundle Adjustment - A Modern Synthesis", 2000, section 6.
 
 #include <Eigen/Core>
@@ -52,22 +51,23 @@ class CameraBundle {
   std::vector<BundleView> views;
 
   [[nodiscard]] int globalCount() const { return camera_count == 2 ? 22 : 8; }
-  /// Distortion terms of a lens that are solved for: one to begin with, then all four.
+  /// Distortion terms that are solved for: one at first, then all four.
   enum class Terms : std::uint8_t { kOne, kAll };
 
-  /// Until it no longer changes. `robust_scale` [px]: Cauchy's; zero: plain squares. False: no minimum found.
+  /// Iterates until convergence. `robust_scale` [px]: of the Cauchy weights; 0: plain squares. False: no
+  /// minimum found.
   bool solve(Terms terms, double robust_scale);
 
   /// seen - predicted; false if the lens does not reach the point.
   [[nodiscard]] bool residual(const BundleView& view, const BundleCorner& corner, Eigen::Vector2d& r) const;
-  /// Lengths of all residuals, used or not; infinite if there is none.
+  /// Lengths of all residuals, used or not; infinite if a corner has none.
   [[nodiscard]] std::vector<double> residualNorms() const;
-  /// Of the globals, the board's pose eliminated, for corners of 1 px sigma.
+  /// Information on the globals with the board's pose eliminated, for corners of 1 px sigma.
   [[nodiscard]] Information information(const BundleView& view) const;
   [[nodiscard]] Information information() const;
 
-  /// Solves robustly, then leaves out corners beyond four sigma until none changes. Views that keep fewer
-  /// than six corners go. False: failed. `sigma`: of a corner's pixel, per axis.
+  /// Solves robustly, then removes corners beyond four sigma until none changes. Views with fewer than six
+  /// remaining corners are removed. False: failed. `sigma`: of a corner's pixel, per axis.
   bool solveWithoutOutliers(double& sigma);
 
  private:

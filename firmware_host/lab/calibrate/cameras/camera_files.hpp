@@ -1,5 +1,5 @@
 #pragma once
-// What was found about cameras, for people and for other programs.
+// Calibrated cameras as text for people and as files for other programs.
 
 #include <string>
 

@@ -14,11 +14,11 @@
 namespace swiftlet {
 namespace {
 
-/// Two boards' tags at least, or a small checkerboard.
+/// At least two tags, or a small checkerboard.
 constexpr std::size_t kFewestInView = 8;
 
-/// Centre, extent and slant of what is seen, in image widths, for both cameras; a camera without the board is
-/// far from all that have it.
+/// Centre, extent and slant of the board in the image, in image widths, for both cameras. A camera without
+/// the board is far from all that see it.
 using Look = Eigen::Matrix<double, 10, 1>;
 
 Look lookOf(const Moment& moment, const std::array<CameraModel, kMaxCameras>& sizes) {
@@ -43,7 +43,7 @@ Look lookOf(const Moment& moment, const std::array<CameraModel, kMaxCameras>& si
   return look;
 }
 
-/// Natural logarithm of the determinant, of a matrix brought to ones by `scale`.
+/// Natural logarithm of the determinant of a matrix normalized by `scale`.
 double logDeterminant(const Eigen::MatrixXd& A, const Eigen::VectorXd& scale) {
   const Eigen::LLT<Eigen::MatrixXd> factor(scale.asDiagonal() * A * scale.asDiagonal());
   if (factor.info() != Eigen::Success) return -std::numeric_limits<double>::infinity();
@@ -107,7 +107,7 @@ std::vector<const Moment*> spreadMoments(const std::vector<const Moment*>& momen
   std::vector<Look> looks;
   for (const Moment* moment : moments) looks.push_back(lookOf(*moment, sizes));
   std::vector<double> distance(moments.size(), std::numeric_limits<double>::infinity());
-  // From the one with the most corners on.
+  // Starts with the moment with the most corners.
   const auto corners = [](const Moment* m) {
     std::size_t sum = 0;
     for (const BoardView* view : m->seen) sum += view == nullptr ? 0 : view->corners.size();
@@ -153,10 +153,10 @@ void chooseInformative(const CalibrationTarget& target, const std::vector<Moment
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(bundle.globalCount(), bundle.globalCount());
   for (const Candidate& candidate : open) total += candidate.information;
   const Eigen::VectorXd scale = total.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  // A weak beginning, so that the first views have a finite gain: a millionth of what all views tell.
+  // Weak initial information, so that the first views have a finite gain: a millionth of that of all views.
   Eigen::MatrixXd A = 1e-6 * total.diagonal().asDiagonal().toDenseMatrix();
   double value = logDeterminant(A, scale);
-  // A view never gains more than it did before others were taken: only the best few are computed again.
+  // A view's gain never increases when others are added: only the best few are computed again.
   while (bundle.views.size() < count && !open.empty()) {
     std::size_t best = 0;
     double best_gain = -std::numeric_limits<double>::infinity();

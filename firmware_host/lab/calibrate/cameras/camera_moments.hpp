@@ -1,6 +1,6 @@
 #pragma once
-// Which images of a board a calibration uses: two cameras' views of one moment, and of all moments those that
-// tell most.
+// Selects images of a board for calibration: pairs two cameras' views of one moment, and chooses the most
+// informative moments.
 
 #include <array>
 #include <cstddef>
@@ -25,20 +25,20 @@ struct Moments {
   double stamp_difference = 0;
 };
 
-/// Views of both cameras whose stamps differ by less than a millisecond are one moment; views with few
-/// corners are left out. `views` must outlive the result.
+/// Views of both cameras whose stamps differ by less than a millisecond form one moment; views with few
+/// corners are omitted. `views` must outlive the result.
 [[nodiscard]] Moments pairViews(const std::vector<BoardView>& views, std::size_t camera_count);
 
-/// At most `count` that differ most in where and how the board lies in the images: each next one is the
-/// farthest from those taken.
+/// At most `count` moments that differ most in the board's position and orientation in the images: each next
+/// one is the farthest from those chosen.
 [[nodiscard]] std::vector<const Moment*> spreadMoments(const std::vector<const Moment*>& moments,
                                                        const std::array<CameraModel, kMaxCameras>& sizes,
                                                        std::size_t count);
 
-/// Adds the views of `candidates`, posed in the frame of the bundle, that raise the determinant of the
-/// globals' information most, one after the other, until there are `count`. Views whose corners are far from
-/// where the bundle's lenses see them (`most_rms` px) are left out. Source: Sebastiani, Wynn, "Maximum
-/// Entropy Sampling and Optimal Bayesian Experimental Design", 2000.
+/// Adds those views of `candidates`, posed in the frame of the bundle, that increase the determinant of the
+/// globals' information most, one after the other, until there are `count`. Views whose corners are more than
+/// `most_rms` px from the bundle's prediction are omitted. Source: Sebastiani, Wynn, "Maximum Entropy
+/// Sampling and Optimal Bayesian Experimental Design", 2000.
 void chooseInformative(const CalibrationTarget& target, const std::vector<Moment>& candidates,
                        double most_rms, std::size_t count, CameraBundle& bundle);
 

@@ -1,5 +1,5 @@
 #pragma once
-// What is found about one or two cameras from views of a board.
+// Calibration of one or two cameras from views of a board.
 
 #include <Eigen/Core>
 #include <array>
@@ -14,10 +14,10 @@
 
 namespace swiftlet {
 
-/// px: corners of one detector share errors of some hundredths that residuals do not show.
+/// px: corners of one detector share errors of some hundredths, which residuals do not show.
 inline constexpr double kLeastCornerSigma = 0.02;
 
-/// A corner that was used, or left out as an outlier.
+/// A corner that was used, or removed as an outlier.
 struct CornerResidual {
   std::size_t camera = 0;
   std::size_t view = 0;  ///< index into `views`
@@ -37,9 +37,9 @@ struct SolvedCamera {
 
   CameraModel model;
   Covariance covariance = Covariance::Zero();  ///< fx fy cx cy [px], then the four of the distortion
-  std::string why_this_model;                  ///< in words, with the other model's figure
+  std::string why_this_model;                  ///< in words, with the other model's value
   double rms = 0;                              ///< px per axis, without outliers
-  /// The same lens from every other view, and from the rest.
+  /// The same lens from the even views, and from the odd ones.
   std::array<CameraModel, 2> halves;
 };
 
@@ -49,10 +49,10 @@ struct CameraSolution {
   SE3 T_cam1_cam0;
   /// Of T_cam1_cam0: rotation vector [rad] then translation [m], as in R <- R Exp(phi), t <- t + dt.
   Eigen::Matrix<double, 6, 6> stereo_covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  double corner_sigma = 0;  ///< px per axis, found from the residuals
+  double corner_sigma = 0;  ///< px per axis, from the residuals
   std::vector<SolvedView> views;
   std::vector<CornerResidual> corners;
-  /// Why this is not to be trusted, a sentence each with its remedy; empty: good.
+  /// Why this cannot be trusted, one sentence each with its remedy; empty: good.
   std::vector<std::string> reasons;
 };
 

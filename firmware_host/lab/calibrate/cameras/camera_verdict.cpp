@@ -1,4 +1,4 @@
-// Why a calibration of cameras is not to be trusted.
+// Reasons not to trust a calibration of cameras.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,29 +15,29 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kFewestGoodViews = 10;
-constexpr double kImagePart = 0.95;  ///< of the image, that a limit holds for
-/// rad: 0.3 px of a lens with 450 px focal length, a third of what a tracked feature is off by.
+constexpr double kImagePart = 0.95;  ///< of the image, for which a limit holds
+/// rad: 0.3 px of a lens with 450 px focal length, a third of a tracked feature's error.
 constexpr double kMostProjectionSigma = 0.7e-3;
-constexpr double kMostCornerSigma = 1.5e-3;    ///< rad: 0.7 px there; sharp images have a tenth
-constexpr double kMostSigmaRatio = 2;          ///< of one camera's corners to the other's
-constexpr double kMostJointRatio = 1.5;        ///< of both cameras together to the worse one alone
+constexpr double kMostCornerSigma = 1.5e-3;    ///< rad: 0.7 px of that lens; sharp images have a tenth
+constexpr double kMostSigmaRatio = 2;          ///< of the two cameras' corner sigmas
+constexpr double kMostJointRatio = 1.5;        ///< of the joint solution's sigma to the worse single one
 constexpr double kMostOutliers = 0.05;         ///< of all corners
 constexpr double kMostHalfRatio = 3;           ///< of the halves' difference to its 1 sigma
-constexpr double kLeastHalfDifference = 2e-4;  ///< rad: less does no harm
-constexpr double kMostBaselineError = 0.03;    ///< of a baseline told
-constexpr double kLeastBaselineError = 2e-3;   ///< m: a ruler's
+constexpr double kLeastHalfDifference = 2e-4;  ///< rad; smaller differences are harmless
+constexpr double kMostBaselineError = 0.03;    ///< of the given baseline
+constexpr double kLeastBaselineError = 2e-3;   ///< m, of a ruler
 constexpr double kMostStampDifference = 5e-4;  ///< s
 constexpr double kMostStretch = 0.004;         ///< of the board: 1 mm in 250
 constexpr double kStretchSigmas = 5;
 constexpr double kTriedStretch = 0.005;
 
-/// By how much a part of the board differs from what its file says, and that value's sigma.
+/// How much a part of the board deviates from its file, and the sigma of that value.
 struct Stretch {
   double value = 0;
   double sigma = std::numeric_limits<double>::infinity();
 };
 
-/// The least of the parabola through three solutions: the board as told, a little smaller and a little
+/// Minimum of the parabola through three solutions: with the board as given, slightly smaller, and slightly
 /// larger.
 template <typename Change>
 Stretch stretchOf(const CameraBundle& bundle, double sigma, const Change& change) {
@@ -59,7 +59,7 @@ Stretch stretchOf(const CameraBundle& bundle, double sigma, const Change& change
   }
   const double curvature = (cost[0] - 2 * cost[1] + cost[2]) / (kTriedStretch * kTriedStretch);
   const double slope = (cost[2] - cost[0]) / (2 * kTriedStretch);
-  // Cost is a sum of squares in sigmas: its second derivative is twice the information.
+  // The cost is a sum of squares in sigmas, so its second derivative is twice the information.
   if (!(curvature > 0)) return {};
   return {-slope / curvature, std::sqrt(2 / curvature)};
 }
@@ -86,7 +86,7 @@ void judgeBoard(const CameraSolution& solution, const CameraEvidence& evidence,
         const double wider = target.size * target.gap * part;
         corner.point += Eigen::Vector3d(wider * (tag % target.columns), wider * (tag / target.columns), 0);
       });
-  // Of the gap alone a part is less than the same part of the board.
+  // A share of the gap is less than the same share of the board.
   if (std::abs(gap.value) * target.gap > kMostStretch && std::abs(gap.value) > kStretchSigmas * gap.sigma) {
     reasons.push_back(
         fmt::format("The gap between the tags is {:.3f} tag edges, but {:.3f} in the board file: measure "

@@ -24,7 +24,7 @@ Eigen::Matrix<double, 2, kLensParameters> lensJacobian(const CameraModel& lens, 
   }
   const double r = p.head<2>().norm();
   const double theta = std::atan2(r, p.z());
-  if (r < 1e-9 * std::abs(p.z())) return J;  // on the axis nothing but the centre moves the pixel
+  if (r < 1e-9 * std::abs(p.z())) return J;  // on the axis, only the centre moves the pixel
   const double t2 = theta * theta;
   const double distorted = theta * (1 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
   const Eigen::Vector2d direction = p.head<2>() / r;

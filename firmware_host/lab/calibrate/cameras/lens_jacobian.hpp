@@ -1,13 +1,13 @@
 #pragma once
-// How a projected pixel depends on the eight parameters of a lens (estimator/camera/camera_model.hpp).
+// Derivatives of a projected pixel by the eight parameters of a lens (estimator/camera/camera_model.hpp).
 
 #include "estimator/camera/camera_model.hpp"
 
 namespace swiftlet {
 
-inline constexpr int kLensParameters = 8;  ///< fx fy cx cy, then the four of the distortion
+inline constexpr int kLensParameters = 8;  ///< fx fy cx cy, then four distortion terms
 
-/// d pixel / d parameters of a point that the lens projects.
+/// d pixel / d parameters, for a point that the lens can project.
 [[nodiscard]] Eigen::Matrix<double, 2, kLensParameters> lensJacobian(const CameraModel& lens,
                                                                      const Eigen::Vector3d& p_cam);
 

@@ -15,12 +15,12 @@ constexpr double kNarrowest = 25 * std::numbers::pi / 180;  ///< horizontal fiel
 constexpr double kWidestPinhole = 130 * std::numbers::pi / 180;
 constexpr double kWidest = 230 * std::numbers::pi / 180;
 constexpr double kWidening = 1.12;          ///< from one guess to the next: focal lengths within 6 percent
-constexpr std::size_t kViewsForFocal = 12;  ///< of the first guesses
-constexpr std::size_t kFewestViews = 3;     ///< Zhang: two fix the lens, a third shows a mistake
-constexpr double kNoPose = 1e3;             ///< px, of a view that has no pose
+constexpr std::size_t kViewsForFocal = 12;  ///< used for the first guesses
+constexpr std::size_t kFewestViews = 3;     ///< Zhang: two determine the lens, a third reveals a mistake
+constexpr double kNoPose = 1e3;             ///< px, for a view without a pose
 constexpr double kClipSigmas = 4;
 
-/// Views of one camera alone stand as those of camera 0.
+/// Views of a single camera are entered as camera 0's.
 void addView(const CalibrationTarget& target, const BoardView& view, const SE3& T_cam_board,
              CameraBundle& bundle) {
   BundleView added;
@@ -30,8 +30,7 @@ void addView(const CalibrationTarget& target, const BoardView& view, const SE3& 
   bundle.views.push_back(std::move(added));
 }
 
-/// Mean length of the residuals of a view, posed as well as the lens can; what lies beyond `clip` counts as
-/// it.
+/// Mean residual length of a view at its best pose for this lens; residuals are limited to `clip`.
 double misfit(const CalibrationTarget& target, const CameraModel& lens, const BoardView& view, double clip) {
   const std::optional<SE3> T = boardPose(target, lens, view, kNoPose);
   if (!T) return clip;
@@ -98,7 +97,7 @@ std::optional<LensFit> fitLens(const CalibrationTarget& target, CameraKind kind,
   CameraBundle bundle;
   bundle.lens[0] = firstLens(target, kind, camera, size, moments);
   if (bundle.lens[0].width() == 0) return std::nullopt;
-  // The second time around with the lens found: views that had no pose, or a poor one, get theirs.
+  // The second pass uses the lens found: views without a pose, or with a poor one, get a new pose.
   for (const double most_rms : {kNoPose, kNoPose}) {
     bundle.views.clear();
     for (const Moment* moment : moments) {

@@ -1,9 +1,9 @@
 #pragma once
-// One camera's lens without a first guess, in one of the two models.
+// Finds one camera's lens without an initial guess, in one of the two models.
 //
-// Focal lengths from a narrow to the widest lens are tried without distortion: with each, the board's pose in
-// every view follows (board_pose.hpp), and the one that predicts the corners best is where the bundle begins.
-// First focal length, centre and one term of distortion are solved robustly, then all.
+// Focal lengths from a narrow lens to the widest are tried without distortion: each gives the board's pose in
+// every view (board_pose.hpp), and the focal length that predicts the corners best is the bundle's start.
+// Focal length, centre and one distortion term are solved robustly first, then all terms.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -18,13 +18,13 @@ namespace swiftlet {
 struct LensFit {
   CameraModel lens;
   double sigma = 0;  ///< px per axis, without outliers
-  /// Mean square per axis [px^2] over all corners, each view posed by itself; corners beyond four sigma count
-  /// as four sigma.
+  /// Mean square per axis [px^2] over all corners, each view posed separately; larger residuals count as
+  /// `clip_sigma` sigmas.
   [[nodiscard]] double meanSquare(const CalibrationTarget& target, std::size_t camera,
                                   const std::vector<const Moment*>& moments, double clip_sigma) const;
 };
 
-/// `size`: width and height [px]. Nothing where the model cannot describe the lens.
+/// `size`: width and height [px]. Empty if the model cannot describe the lens.
 [[nodiscard]] std::optional<LensFit> fitLens(const CalibrationTarget& target, CameraKind kind,
                                              std::size_t camera, const Eigen::Vector2i& size,
                                              const std::vector<const Moment*>& moments);

@@ -16,7 +16,7 @@ namespace {
 constexpr int kRotationSteps = 12;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// Of a pixel; by the lens NaN where it has no ray.
+/// Derivatives of a pixel; by_lens is NaN where the pixel has no ray.
 struct PixelDerivatives {
   Eigen::Matrix<double, 2, 8> by_lens = Eigen::Matrix<double, 2, 8>::Constant(kNone);
   Eigen::Matrix<double, 2, 3> by_rotation = Eigen::Matrix<double, 2, 3>::Zero();

@@ -27,10 +27,10 @@ constexpr std::size_t kLongestPiece = 40;  // keyframes, some 8 s
 constexpr std::size_t kShortestPiece = 15;
 constexpr std::size_t kWantedPieces = 5;
 constexpr std::size_t kMostPieces = 10;
-constexpr std::size_t kFewestPieces = 3;  // whose scatter says something
-constexpr double kMostBetween = 1.0;      // s between neighbouring keyframes
+constexpr std::size_t kFewestPieces = 3;  // fewer show no scatter
+constexpr double kMostBetween = 1.0;      // s, between neighbouring keyframes
 
-/// A folder for the run that is removed again, unless the user named one.
+/// A folder for the run that is deleted afterwards unless the user named one.
 class RunPlace {
  public:
   explicit RunPlace(const std::string& wanted) : path_(wanted), own_(wanted.empty()) {
@@ -56,7 +56,7 @@ class RunPlace {
 
 using Keyframes = std::vector<FlightKeyframe>;
 
-/// Stretches of keyframes that follow one another.
+/// Reads stretches of consecutive keyframes.
 std::vector<Keyframes> readStretches(KeyframeReader& reader) {
   std::vector<Keyframes> stretches;
   std::vector<ImuSample> samples;
@@ -64,7 +64,7 @@ std::vector<Keyframes> readStretches(KeyframeReader& reader) {
     if (next == KeyframeReader::Next::kSample) samples.push_back(reader.sample());
     if (next != KeyframeReader::Next::kKeyframe) continue;
     FlightKeyframe keyframe{reader.frame(), reader.state(), reader.noiseInUse(), samples};
-    // The next interval begins at this frame, with some samples before it for another clock.
+    // The next interval begins at this frame; some earlier samples are kept for a time shift.
     const Stamp keep = keyframe.frame.stamp - Duration::fromMilliseconds(100);
     std::erase_if(samples, [&](const ImuSample& sample) { return sample.stamp < keep; });
     if (stretches.empty() || stretches.back().back().state.epoch != keyframe.state.epoch ||
@@ -76,8 +76,8 @@ std::vector<Keyframes> readStretches(KeyframeReader& reader) {
   return stretches;
 }
 
-/// At most kMostPieces of one length, spread over the flight. Short flights have short pieces: their scatter
-/// needs some.
+/// At most kMostPieces of equal length, spread over the flight. Short flights have short pieces, so that
+/// there are enough for a scatter.
 std::vector<Keyframes> cut(const std::vector<Keyframes>& stretches) {
   std::size_t total = 0;
   for (const Keyframes& stretch : stretches) total += stretch.size();
@@ -95,37 +95,37 @@ std::vector<Keyframes> cut(const std::vector<Keyframes>& stretches) {
   return chosen;
 }
 
-/// What is judged: a linear combination of the columns of the change.
+/// A checked quantity: a linear combination of the columns of the change.
 struct Quantity {
   std::string name;
   std::string unit;
-  CalibrationChange row = CalibrationChange::Zero();  ///< to `unit`
+  CalibrationChange row = CalibrationChange::Zero();  ///< converts to `unit`
   double limit = 0;                                   ///< in `unit`
   double file = 0;
   double effect_per_unit = 0;
   std::string effect_unit = {};
   bool essential = true;
-  double model_sigma = 0;  ///< in `unit`: errors of the IMU that no variable stands for
+  double model_sigma = 0;  ///< in `unit`: IMU errors that no variable models
 };
 
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
-// Limits: what costs accuracy, or what calibrations of good tools differ by, whichever is larger.
+// Limits: the larger of what costs accuracy and what calibrations by good tools differ by.
 constexpr double kShiftLimit = 2;  // ms: 2 mrad at 1 rad/s
 constexpr double kTurnLimit =
     0.15;                          // deg: two good tools differ by up to 0.3 on EuRoC's rig, 0.03 on TUM-VI's
 constexpr double kMoveLimit = 20;  // mm: Kalibr and Basalt differ by 8
 constexpr double kFocalLimit = 0.5;     // %
-constexpr double kRigTurnLimit = 0.05;  // deg: the epipolar gate is 1.5 px, 0.19 deg of a 460 px lens
-// The flight's length comes from the accelerometer, whose misalignment is not estimated, nor what warming up
-// does to its scale: 0.02 %/K (MPU-6000, data sheet 3.4, 6.2) over 25 K.
+constexpr double kRigTurnLimit = 0.05;  // deg; the epipolar gate is 1.5 px, 0.19 deg of a 460 px lens
+// The flight's scale comes from the accelerometer. Its misalignment and the scale change by warming up are
+// not estimated: 0.02 %/K (MPU-6000, data sheet 3.4, 6.2) over 25 K.
 constexpr double kLengthSigma = 0.5;                 // %
-constexpr double kBaselineLimit = 3 * kLengthSigma;  // %: what these errors alone do not reach
+constexpr double kBaselineLimit = 3 * kLengthSigma;  // %; beyond what these errors alone cause
 constexpr double kToDegrees = 180 / std::numbers::pi;
 constexpr double kToMilli = 1e3;
 constexpr double kPercent = 100;
-// A hundred quantities are judged in ten flights: chance alone must not raise an alarm in any.
+// Ten flights have a hundred such quantities: chance alone must not raise an alarm in any.
 constexpr double kAlarmSigmas = 4;
-constexpr double kKnownSigmas = 2;  // in the limit, for "holds"
+constexpr double kKnownSigmas = 2;  // of the limit, for "holds"
 constexpr double kLeastStereoShare = 0.25;
 
 std::vector<Quantity> quantitiesOf(const Rig& rig) {
@@ -138,8 +138,8 @@ std::vector<Quantity> quantitiesOf(const Rig& rig) {
   shift.effect_per_unit = focal / kToMilli;
   shift.effect_unit = "px at 1 rad/s";
   quantities.push_back(shift);
-  // A gyro whose axes lean by `a` reads (I + hat(a)) rate: to the images that is a turn of the camera by
-  // R_cam_body a. The sum of both is what flights see; how it is shared, they hardly do.
+  // A gyro whose axes are tilted by `a` reads (I + hat(a)) rate; for the images this is a rotation of the
+  // camera by R_cam_body a. Flights determine the sum of both but hardly their shares.
   const Eigen::Matrix3d R_cam_body = rig.T_body_cam[0].R().transpose();
   for (int axis = 0; axis < 3; ++axis) {
     Quantity turn{
@@ -206,7 +206,7 @@ struct Sum {
   ChangeMatrix covariance = ChangeMatrix::Zero();
 };
 
-/// All pieces but one (-1: all).
+/// Sum over all pieces except `without`; -1: all.
 Sum together(const std::vector<PieceResult>& pieces, std::ptrdiff_t without) {
   const ChangeMatrix prior = changePriors().cwiseAbs2().cwiseInverse().asDiagonal();
   ChangeMatrix information = prior;
@@ -214,10 +214,10 @@ Sum together(const std::vector<PieceResult>& pieces, std::ptrdiff_t without) {
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (static_cast<std::ptrdiff_t>(i) == without) continue;
     information += pieces[i].information;
-    // A piece's change includes the priors' pull.
+    // A piece's change includes the effect of the priors.
     weighted += (pieces[i].information + prior) * pieces[i].change;
   }
-  // Columns differ by many powers of ten.
+  // Columns differ by many orders of magnitude.
   const CalibrationChange scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::LDLT<ChangeMatrix> factor(scale.asDiagonal() * information * scale.asDiagonal());
   Sum sum;
@@ -226,7 +226,7 @@ Sum together(const std::vector<PieceResult>& pieces, std::ptrdiff_t without) {
   return sum;
 }
 
-/// What both halves of the image say, apart.
+/// Results from the inner and the outer half of the image.
 struct Parts {
   std::vector<PieceResult> inner;
   std::vector<PieceResult> outer;
@@ -237,8 +237,8 @@ struct Estimate {
   double variance = 0;
 };
 
-/// The larger variance: the formal one, or that of leaving out each piece in turn, which sees what differs
-/// over the flight.
+/// Uses the larger variance: the formal one or the jackknife's (leaving out each piece in turn), which shows
+/// changes during the flight.
 Estimate estimateOf(const Quantity& quantity, const std::vector<PieceResult>& pieces) {
   const Sum all = together(pieces, -1);
   const auto count = static_cast<double>(pieces.size());
@@ -253,7 +253,7 @@ Estimate estimateOf(const Quantity& quantity, const std::vector<PieceResult>& pi
   return {quantity.row.dot(all.change), std::max(quantity.row.dot(all.covariance * quantity.row), scatter)};
 }
 
-/// `disagree` becomes true where the parts of the image keep it from being told.
+/// Sets `disagree` if disagreement between the parts of the image prevents a verdict.
 CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pieces, const Parts& parts,
                    bool& disagree) {
   CheckedValue value;
@@ -265,7 +265,7 @@ CheckedValue judge(const Quantity& quantity, const std::vector<PieceResult>& pie
   const Estimate all = estimateOf(quantity, pieces);
   value.change = all.value;
   double variance = all.variance + quantity.model_sigma * quantity.model_sigma;
-  // A lens model that does not fit says one thing in the middle and another at the rim.
+  // A lens model that does not fit gives different results in the middle and at the rim.
   if (parts.inner.size() >= kFewestPieces && parts.outer.size() >= kFewestPieces) {
     const Estimate inner = estimateOf(quantity, parts.inner);
     const Estimate outer = estimateOf(quantity, parts.outer);

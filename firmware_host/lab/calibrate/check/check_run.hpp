@@ -2,9 +2,9 @@
 // Checks from a flight without a board whether a calibration still holds: implements `swiftlet calibrate
 // check`.
 //
-// The estimator runs on the log with its own refinement of the calibration enabled. Its keyframes are cut
-// into pieces, and each piece estimates the calibration (flight_piece.hpp). The information of the pieces is
-// added; their scatter, from leaving each out in turn, gives the uncertainty of the sum. Method, limits and
+// The estimator runs on the log with its own calibration refinement enabled. Its keyframes are cut into
+// pieces, and each piece estimates the calibration (flight_piece.hpp). The information of the pieces is
+// added; the uncertainty of the sum comes from their scatter, by leaving each out in turn. Method, limits and
 // their reasons: docs/calibration.md. Off the flight path.
 
 #include <array>
@@ -23,27 +23,27 @@ const char* name(CheckVerdict verdict);
 struct CheckedValue {
   std::string name;
   std::string unit;
-  double file = 0;    ///< what the calibration says; of rotations 0: their change is what counts
-  double change = 0;  ///< what the flight says, less that
+  double file = 0;    ///< value in the calibration; 0 for rotations, of which only the change matters
+  double change = 0;  ///< the flight's value minus the calibration's
   double sigma = 0;
   double limit = 0;       ///< a change of this size costs accuracy
-  bool essential = true;  ///< false: flights do not feel it, and it may stay unknown
-  std::string effect;     ///< of the change: pixels at the image's rim, millimetres
+  bool essential = true;  ///< false: flights are not sensitive to it, so it may stay unknown
+  std::string effect;     ///< effect of the change: pixels at the image's rim, millimetres
   CheckVerdict verdict = CheckVerdict::kCannotTell;
 };
 
 struct CheckResult {
   CheckVerdict verdict = CheckVerdict::kCannotTell;
-  std::vector<std::string> because;  ///< a sentence each, with its remedy
+  std::vector<std::string> because;  ///< one sentence each, with its remedy
   std::vector<CheckedValue> values;
   std::vector<PieceResult> pieces;
-  Rig rig;                  ///< as the file has it
-  double stereo_share = 0;  ///< of the points, seen by both cameras
+  Rig rig;                  ///< as in the file
+  double stereo_share = 0;  ///< share of points seen by both cameras
   std::string log;
 };
 
 struct CheckRequest : LogRequest {
-  std::string out;  ///< folder for the run; empty: one that is removed afterwards
+  std::string out;  ///< folder for the run; empty: a temporary one
 };
 
 /// InputError if the log or its calibration cannot be read.

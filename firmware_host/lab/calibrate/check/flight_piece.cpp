@@ -15,10 +15,10 @@ namespace {
 
 using change::kCount;
 
-// A piece starts with biases that the flight has found to this.
+// Accuracy of the flight's biases at the start of a piece.
 constexpr double kGyroBiasPrior = 0.02;  // rad/s
 constexpr double kAccelBiasPrior = 0.3;  // m/s^2
-constexpr double kGaugePrior = 1e-6;     // m, rad: the first position and yaw, which nothing sees
+constexpr double kGaugePrior = 1e-6;     // m, rad: the first position and yaw, which are unobservable
 constexpr double kLargestInverseDepth = 20;
 constexpr std::size_t kFewestSightings = 3;
 constexpr double kOutlier = 6;  // sigmas
@@ -29,7 +29,7 @@ struct View {
   Eigen::Vector2d pixel;
 };
 
-/// A point on the ray from a fixed place: anchor + bearing / inverse_depth.
+/// A point on the ray from a fixed anchor: anchor + bearing / inverse_depth.
 struct Point {
   Eigen::Vector3d anchor;
   Eigen::Vector3d bearing;
@@ -153,7 +153,7 @@ class Piece {
     Eigen::Matrix3d R_world_body;
     SE3 T_body_cam0;
     SE3 T_cam0_cam1;
-    double moved = 0;  // s, of the pose behind the state's stamp
+    double moved = 0;  // s, from the state's stamp to the pose
   };
   Placed placed(const Solution& at, const View& view) const {
     Placed p;
@@ -171,7 +171,7 @@ class Piece {
     return {T.rotation * expSo3(by.segment<3>(column)), T.translation + by.segment<3>(column + 3)};
   }
 
-  /// Where the point lies for a view, times its inverse depth: in the body, in camera 0 and in its camera.
+  /// The point for a view, times its inverse depth: in the body, in camera 0 and in the view's camera.
   struct Seen {
     Placed at;
     Eigen::Vector3d body, cam0, cam;
@@ -205,7 +205,7 @@ class Piece {
     return true;
   }
 
-  /// From its first view and the inverse depth at which the others fit best.
+  /// Places a point from its first view, at the inverse depth that fits the others best.
   bool place(Point& point) const {
     const View& first = point.views.front();
     const Placed p = placed(now_, first);
@@ -247,7 +247,7 @@ class Piece {
     return cost;
   }
 
-  /// Kept of a point for its own step.
+  /// Kept for a point's own step.
   struct Eliminated {
     Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -296,7 +296,7 @@ class Piece {
       const Matrix23d J_cam0 = -inverse_sigma * J_proj * R_cam_cam0;
       const Matrix23d J_body = J_cam0 * R_cam0_body;
       Eigen::Matrix<double, 2, 6> J_pose;
-      // The state's own rotation: the pose has moved on by Exp(rate moved), which is small.
+      // The state's own rotation: the pose differs by Exp(rate moved), which is small.
       J_pose.leftCols<3>() = J_body * hat(seen.body);
       J_pose.rightCols<3>() = -rho * J_body * R_body_world;
       Eigen::Matrix<double, 2, kCount> J_cal = Eigen::Matrix<double, 2, kCount>::Zero();
@@ -363,7 +363,7 @@ class Piece {
     gyro.retract(at.change);
     MotionFactor factor;
     if (!imuFactor(link.imu, link.noise, from, at.states[k], factor, &gyro)) return 0;
-    // The walk of the bias knows nothing of the scale.
+    // The bias's random walk does not include the scale.
     factor.residual.tail<3>() += factor.jacobian_j(12, 12) * by_scale;
     const double cost = 0.5 * factor.residual.squaredNorm();
     if (!build) return cost;
@@ -402,7 +402,7 @@ class Piece {
       prior(12 + i, (first.bias_accel - given.bias_accel)[i], kAccelBiasPrior);
     }
     for (int i = 0; i < kCount; ++i) prior(calibrationColumn() + i, at.change[i], priors_[i]);
-    // Yaw: the turn about the world's vertical.
+    // Yaw: rotation about the world's vertical.
     const Eigen::Vector3d up_body = first.T_world_body.rotation.conjugate() * Eigen::Vector3d::UnitZ();
     const double yaw =
         up_body.dot(logSo3(given.T_world_body.rotation.conjugate() * first.T_world_body.rotation));
@@ -482,7 +482,7 @@ class Piece {
   std::vector<Eigen::Vector3d> rates_;
   std::vector<Link> links_;
   Solution now_;
-  Eigen::MatrixXd H_;  // upper part
+  Eigen::MatrixXd H_;  // upper triangle
   Eigen::VectorXd b_;
   std::vector<Eliminated> eliminated_;
 };
@@ -495,7 +495,7 @@ CalibrationChange changePriors() {
   constexpr double kMoveSigma = 0.05;   // m
   constexpr double kFocalSigma = 0.05;
   constexpr double kRigMoveSigma = 0.02;  // m
-  // Accelerometers of drones are off by up to a per cent.
+  // Accelerometers of drones have scale errors of up to a percent.
   constexpr double kAccelScaleSigma = 1e-2;
   CalibrationChange sigma;
   sigma[change::kShift] = kShiftSigma;
