@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostRepeats = 190;  // as many values of frontend.max_features are two apart in its range
+constexpr int kMostRepeats = 190;  // frontend.max_features has this many values, two apart, in its range
 constexpr int kMostSeeds = 100000;
 
 int wholeNumber(const YamlField& field, int least, int most) {
@@ -47,7 +47,7 @@ std::string nameOf(const YamlField& field, const std::string& name) {
   return name;
 }
 
-/// Sorted; the pattern itself where it has no wildcard.
+/// Sorted matches; the pattern itself if it has no wildcard.
 std::vector<std::string> matches(const YamlField& field, const std::string& folder) {
   const std::string pattern = field.text();
   if (pattern.find_first_of("*?[") == std::string::npos) {
@@ -68,7 +68,7 @@ std::vector<std::string> matches(const YamlField& field, const std::string& fold
   return paths;
 }
 
-/// "a/b/" and "a/b.bag" give b.
+/// "a/b/" and "a/b.bag" both give b.
 std::string stemOf(const std::string& path) {
   const fs::path whole = fs::path(path).lexically_normal();
   return (whole.has_filename() ? whole : whole.parent_path()).stem();
@@ -163,7 +163,7 @@ class Reader {
 
   Campaign campaign_;
   std::vector<std::string> common_;
-  std::map<std::string, int> lines_;  ///< of each name
+  std::map<std::string, int> lines_;  ///< line of each name
 };
 
 }  // namespace

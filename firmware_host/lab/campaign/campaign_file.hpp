@@ -7,10 +7,10 @@
 //     - data/euroc_mh01_20s         # paths and options are relative to this file; * and ? as in a shell
 //     - path: data/flights/*.bag
 //       options: [--mono]
-//       truth: mocap/poses.tum      # where the log holds none
-//     - name: rooms                 # simulated flights, rendered when they are needed
+//       truth: mocap/poses.tum      # if the log has none
+//     - name: rooms                 # simulated flights, rendered when needed
 //       simulate: [--duration, 20]  # options of `swiftlet simulate`
-//       seeds: [1, 50]              # the first and the last; default: 1 alone
+//       seeds: [1, 50]              # first and last seed; default: only 1
 //
 // InputError names file, line and field.
 
@@ -22,20 +22,20 @@ namespace swiftlet {
 
 /// One log, and how it is replayed.
 struct CampaignLog {
-  std::string name;                   ///< of its files: letters, digits, dot, hyphen, underscore; unique
+  std::string name;                   ///< for file names: letters, digits, dot, hyphen, underscore; unique
   std::string path;                   ///< empty: simulated
   std::string truth;                  ///< empty: the log's own
   std::vector<std::string> simulate;  ///< options of `swiftlet simulate`, the seed included
-  std::vector<std::string> options;   ///< of `swiftlet replay`
+  std::vector<std::string> options;   ///< options of `swiftlet replay`
 };
 
 struct Campaign {
-  std::string folder;  ///< of the file, absolute: where the programs are run
+  std::string folder;  ///< absolute folder of the file, in which the programs are run
   int repeats = 1;
-  std::vector<CampaignLog> logs;  ///< in the order of the file; a pattern's sorted by name
+  std::vector<CampaignLog> logs;  ///< in the order of the file; matches of a pattern sorted by name
 };
 
-/// Also looks for the files that patterns name.
+/// Also finds the files that match patterns.
 Campaign readCampaign(const std::string& file);
 Campaign parseCampaign(const std::string& file, std::string_view text);
 

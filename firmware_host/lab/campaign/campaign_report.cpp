@@ -240,7 +240,7 @@ Json tableJson(const CampaignReport& report) {
   return json;
 }
 
-/// The means in rising order: which share of the logs is below an error.
+/// Sorted means: the share of logs below an error.
 Series risingMeans(const std::string& name, std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
   Series series{name, SeriesStyle::kLine, {}, {}, {}};

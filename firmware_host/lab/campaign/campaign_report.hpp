@@ -1,5 +1,5 @@
 #pragma once
-// A campaign's table as files.
+// Writes a campaign's table to files.
 
 #include <optional>
 #include <span>
@@ -17,14 +17,14 @@ struct CampaignReport {
 };
 
 /// Writes into the folder `out`:
-///   table.csv, table.json, table.md  a line for each log
-///   runs.csv                         a line for each run
-///   costs.csv                        CPU, time and memory: all that differs when the same is run again
+///   table.csv, table.json, table.md  one line per log
+///   runs.csv                         one line per run
+///   costs.csv                        CPU, time and memory: everything that differs between identical runs
 ///   table.html                       all of it, with a plot
-/// All but costs.csv and table.html are functions of the rows' accuracy alone.
+/// All except costs.csv and table.html are functions of the rows' accuracy alone.
 void writeCampaign(const CampaignReport& report, const std::string& out);
 
-/// The content of table.md, for the terminal too.
+/// Content of table.md, also for the terminal.
 std::string campaignMarkdown(const CampaignReport& report);
 
 }  // namespace swiftlet

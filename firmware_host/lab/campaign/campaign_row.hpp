@@ -1,5 +1,5 @@
 #pragma once
-// What one replay of a campaign gave.
+// Result of one replay of a campaign.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,36 +10,35 @@
 
 namespace swiftlet {
 
-/// A figure of a run, by its place in the run's summary.
+/// A figure of a run, with its place in the summary.
 struct CampaignFigure {
   std::string_view name;   ///< in CSV and JSON
-  std::string_view title;  ///< in tables for people
+  std::string_view title;  ///< in human-readable tables
   std::string_view place;  ///< JSON pointer into the summary
-  int digits;              ///< after the point, in tables for people
+  int digits;              ///< after the decimal point, in human-readable tables
 };
 
-/// Functions of log, settings and program: the same in every run. The first is what campaigns are compared
-/// by: the RMS position error of the odometry after SE(3) alignment, over all of the flight.
+/// Figures that depend only on log, settings and program. Campaigns are compared by the first: the RMS
+/// position error of the odometry after SE(3) alignment, over the whole flight.
 std::span<const CampaignFigure> accuracyFigures();
-/// What the machine had to do with, too.
+/// Figures that also depend on the machine.
 std::span<const CampaignFigure> costFigures();
 
 enum class CampaignOutcome {
   kDone,
-  kFailed,  ///< the run went to its end, and the replay says that it failed: no pose, or not good for half of
-            ///< it
-  kAborted,  ///< it did not go to its end: bad input, a crash, a full disk; the next campaign tries again
+  kFailed,   ///< the run finished but the replay reports failure: no pose, or good for less than half of it
+  kAborted,  ///< the run did not finish: bad input, a crash, a full disk; the next campaign tries again
 };
 
 struct CampaignRow {
   std::string log;
-  int repeat = 0;                    ///< 0: with the settings as they are
-  std::vector<std::string> command;  ///< what was run, without the program and --out
-  std::string program;               ///< its version and checksum
+  int repeat = 0;                    ///< 0: with unchanged settings
+  std::vector<std::string> command;  ///< the command, without the program and --out
+  std::string program;               ///< version and checksum of the program
   CampaignOutcome outcome = CampaignOutcome::kAborted;
-  std::string says;                             ///< why it is not kDone; empty otherwise
-  std::vector<std::optional<double>> accuracy;  ///< of each of accuracyFigures(); none: no truth
-  std::vector<std::optional<double>> costs;     ///< of each of costFigures()
+  std::string says;                             ///< why it is not kDone; otherwise empty
+  std::vector<std::optional<double>> accuracy;  ///< for each of accuracyFigures(); empty: no truth
+  std::vector<std::optional<double>> costs;     ///< for each of costFigures()
 };
 
 std::string describe(CampaignOutcome outcome);
@@ -49,7 +48,7 @@ std::vector<std::optional<double>> figuresOf(const nlohmann::ordered_json& summa
                                              std::span<const CampaignFigure> figures);
 
 nlohmann::ordered_json toJson(const CampaignRow& row);
-/// Of a file written from toJson(); InputError when it is not one.
+/// Reads a file written from toJson(); InputError if it is not one.
 CampaignRow readCampaignRow(const std::string& file);
 /// OUT/rows/<log>.<repeat>.json
 std::string campaignRowFile(const std::string& out, const std::string& log, int repeat);

@@ -28,15 +28,15 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFeatures = "frontend.max_features";
-constexpr int kFeaturesPerRepeat = 2;  // of 300: 292 to 306 in eight repeats, as docs/accuracy.md has them
+constexpr int kFeaturesPerRepeat = 2;  // of 300: 292 to 306 in eight repeats, as in docs/accuracy.md
 
 std::string textOf(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
-/// The line of a program's output that says what went wrong, or its last. An option that is refused is named
-/// in front of a hint at --help.
+/// The line of a program's output that states the error, or the last line. For a refused option it precedes a
+/// hint at --help.
 std::string complaint(const fs::path& output) {
   std::ifstream file(output);
   std::string said;
@@ -55,7 +55,7 @@ std::string saysOf(const ChildEnd& end, const fs::path& output) {
   return said.empty() ? fmt::format("exit code {}", end.exit_code) : said;
 }
 
-/// `features` by steps down and up in turn; where one of both leaves the range, by the other alone.
+/// Changes `features` by steps alternately down and up; if one direction leaves the range, only in the other.
 int changedFeatures(int features, int repeat) {
   const auto& range = std::get<IntegerSetting>(findSetting(kFeatures)->kind);
   const int down = (features - range.low) / kFeaturesPerRepeat;
@@ -118,9 +118,9 @@ class Job {
     fs::remove_all(rendered(), ignored);
   }
 
-  /// Why there is no log; empty: there is, or it was stopped.
+  /// Renders a log. Returns why there is none; empty: there is, or it was stopped.
   std::string render() {
-    removeRendered();  // what a campaign that was killed left
+    removeRendered();  // left by a campaign that was killed
     std::vector<std::string> words = {request_.program, "simulate", "--out", rendered()};
     words.insert(words.end(), log_.simulate.begin(), log_.simulate.end());
     const fs::path output = rendered().string() + ".txt";
@@ -148,7 +148,7 @@ class Job {
 
   [[nodiscard]] fs::path firstSettings() const { return runFolder(0) / "settings.yaml"; }
 
-  /// The setting that makes a repeat above 0 differ.
+  /// The setting that distinguishes repeats above 0.
   [[nodiscard]] std::string changedSetting(int repeat) const {
     const YAML::Node features = YAML::LoadFile(firstSettings())["frontend"]["max_features"];
     return fmt::format("{}={}", kFeatures, changedFeatures(features.as<int>(), repeat));

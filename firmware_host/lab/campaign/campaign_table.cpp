@@ -7,9 +7,9 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kAte = 0;  // of accuracyFigures()
+constexpr std::size_t kAte = 0;  // index in accuracyFigures()
 constexpr std::size_t kResamples = 2000;
-constexpr std::size_t kFewestForInterval = 3;  // logs; of fewer a bootstrap says nothing
+constexpr std::size_t kFewestForInterval = 3;  // logs; with fewer, a bootstrap is not meaningful
 
 using Figures = std::vector<std::optional<double>> CampaignRow::*;
 
@@ -80,7 +80,7 @@ void addInterval(CampaignComparison& comparison) {
   for (const double one : logs) sum += one;
   comparison.mean_ratio = std::exp(sum / count);
   if (logs.size() < kFewestForInterval) return;
-  std::mt19937_64 random(1);  // the same rows give the same interval
+  std::mt19937_64 random(1);  // fixed seed: equal rows give equal intervals
   std::vector<double> means;
   for (std::size_t i = 0; i < kResamples; ++i) {
     double total = 0;

@@ -17,9 +17,9 @@ namespace swiftlet {
 namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(20);
-constexpr auto kPatience = std::chrono::seconds(10);  // for a run to close its files
+constexpr auto kPatience = std::chrono::seconds(10);  // time for a run to close its files
 
-/// In the child of a program with threads: calls that POSIX allows there, and no others.
+/// Runs in the child of a program with threads: only calls that POSIX allows there.
 [[noreturn]] void become(char* const* arguments, const char* folder, int output, int failure, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(1);
@@ -31,7 +31,7 @@ constexpr auto kPatience = std::chrono::seconds(10);  // for a run to close its 
   _exit(127);
 }
 
-/// The error that kept the child from beginning; 0: it began, which closes the pipe.
+/// The error that prevented the child from starting; 0: it started, which closes the pipe.
 int errorOfStart(int pipe) {
   int error = 0;
   ssize_t got = 0;
