@@ -12,11 +12,11 @@
 namespace swiftlet {
 namespace {
 
-constexpr double kMeanTime = 1.0;     // s, of the mean force that gravity is taken out with
-constexpr double kLongestStep = 0.1;  // s between samples that counts as motion
+constexpr double kMeanTime = 1.0;     // s, window of the mean force, which is subtracted as gravity
+constexpr double kLongestStep = 0.1;  // s; longer gaps between samples do not count as motion
 constexpr std::size_t kLeastCorners = 8;
 
-// The local map of the board at a point of it: pixels per metre.
+// Local linear map of the board at a point: pixels per metre.
 Eigen::Matrix2d affineAt(const Eigen::Matrix3d& H, const Eigen::Vector2d& point) {
   const Eigen::Vector3d h = H * point.homogeneous();
   Eigen::Matrix<double, 2, 3> d;
@@ -116,7 +116,7 @@ void CalibrationGuide::measureTilt(const BoardView& view, Camera& camera) const 
   camera.largest_scale = std::max(camera.largest_scale, scale);
   camera.smallest_scale = camera.smallest_scale > 0 ? std::min(camera.smallest_scale, scale) : scale;
 
-  // Foreshortened along the second axis; nearer where the scale grows.
+  // Foreshortened along the second axis; nearer where the scale increases.
   const Eigen::Vector2d from_middle = place - 0.5 * Eigen::Vector2d(camera.width, camera.height);
   if (std::abs(from_middle.x()) > 0.25 * camera.width || std::abs(from_middle.y()) > 0.25 * camera.height)
     return;
@@ -158,7 +158,7 @@ void CalibrationGuide::missingOf(std::size_t index, std::vector<std::string>& mi
                     index, camera.edge_width, kWidestEdge));
   }
   if (camera.covered() < kColumns * kRows - kMostEmpty) {
-    // The emptiest cell; of equal ones that in the middle of the image first: corners may be dark.
+    // The emptiest cell; of equal ones the one nearest the image's middle, because corners may be dark.
     std::size_t best = 0;
     double least = 1e9;
     for (std::size_t i = 0; i < camera.cells.size(); ++i) {

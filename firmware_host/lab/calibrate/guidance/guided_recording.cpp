@@ -77,7 +77,7 @@ void GuidedRecording::run() {
     if (filled == cameras_ || (filled > 0 && now - asked > kPatience)) {
       look();
     } else if (count(Slot::kIdle) > 0 && filled == 0 && now - asked >= kLookPeriod) {
-      // Both at once, so that both take the same pair.
+      // Both at once, so that both cameras deliver the same pair.
       for (std::size_t c = 0; c < cameras_; ++c)
         picture_[c].slot.store(Slot::kWanted, std::memory_order_release);
       asked = now;
@@ -103,7 +103,7 @@ void GuidedRecording::look() {
     guide_->addView(view, picture.image.width, picture.image.height, edgeWidth(picture.image, view.corners));
   }
   publish();
-  // A camera that gave nothing stays asked for.
+  // The request to a camera that delivered nothing stays.
   for (std::size_t c = 0; c < cameras_; ++c) {
     Slot filled = Slot::kFilled;
     picture_[c].slot.compare_exchange_strong(filled, Slot::kIdle, std::memory_order_acq_rel);
@@ -169,7 +169,7 @@ nlohmann::ordered_json toJson(const CalibrationGuide& guide) {
     const CalibrationGuide::Camera& camera = guide.camera(c);
     nlohmann::ordered_json corners = nlohmann::ordered_json::array();
     for (const BoardCorner& corner : camera.corners) {
-      // Tenths of a pixel are enough to look at.
+      // A tenth of a pixel is enough for display.
       corners.push_back(std::round(10 * corner.pixel.x()) / 10);
       corners.push_back(std::round(10 * corner.pixel.y()) / 10);
     }

@@ -37,7 +37,7 @@ class GuidedRecording final : public RecordWatcher {
   static constexpr int kPictureWidth = 480;  ///< px at most, of the view's pictures
   static constexpr double kLinePeriod = 2;   ///< s between lines on the console
 
-  /// `say`: takes a line for the user, from goOn(). `view`: none without an address.
+  /// `say`: receives a line for the user, called from goOn(). `view`: empty: no live view.
   GuidedRecording(const CalibrationTarget& target, std::function<void(const std::string&)> say,
                   const std::optional<ViewAddress>& view = {});
   ~GuidedRecording() override;
@@ -48,9 +48,9 @@ class GuidedRecording final : public RecordWatcher {
   [[nodiscard]] bool goOn() override;
   void end() override;
 
-  /// Any thread: what is missing now; empty: enough.
+  /// Any thread: what is missing now; empty: the recording is sufficient.
   [[nodiscard]] std::vector<std::string> missing() const;
-  /// Samples that found no room; pairs of images that were looked at.
+  /// Samples lost because there was no room; number of image pairs processed.
   [[nodiscard]] std::uint64_t samplesLost() const { return samples_lost_.load(std::memory_order_relaxed); }
   [[nodiscard]] int looks() const { return looks_.load(std::memory_order_relaxed); }
 
@@ -79,12 +79,12 @@ class GuidedRecording final : public RecordWatcher {
   std::atomic<bool> ending_{false};
   std::thread thread_;
 
-  // Of the low thread.
+  // For the low-priority thread.
   std::optional<CalibrationGuide> guide_;
   std::unique_ptr<BoardDetector> detector_;
   PictureCoder coder_;
 
-  // Between the low thread and the one that waits for the end.
+  // Shared by the low-priority thread and the one that waits for the end.
   mutable std::mutex mutex_;
   std::vector<std::string> missing_;
   double progress_ = 0;
@@ -92,11 +92,10 @@ class GuidedRecording final : public RecordWatcher {
   double line_said_ = -1e9;
 };
 
-/// The state of the guidance for the page: coverage, axes, what is missing; pictures are added by who has
-/// them.
+/// State of the guidance for the page: coverage, axes, what is missing. The caller adds pictures.
 nlohmann::ordered_json toJson(const CalibrationGuide& guide);
 
-/// The page that shows it.
+/// The page that shows this state.
 [[nodiscard]] std::string guidancePage();
 
 }  // namespace swiftlet

@@ -19,7 +19,7 @@ constexpr double kHuber = 3;                                          // sigmas
 constexpr int kParts = 2;                                             // threads
 constexpr int kReadingsAtOnce = 64;
 
-// What is known before a log is looked at. Wide: a log that shows a value moves it by far less than these.
+// Priors. They are wide: a log with information on a value determines it far better.
 constexpr double kLensSpread = 0.3;      // of the focal length: focal length and centre
 constexpr double kDistortionSpread = 3;  // of each coefficient
 constexpr double kTurnSpread = 3;        // rad
@@ -29,12 +29,13 @@ constexpr double kReadoutSpread = 0.05;  // s
 constexpr double kMatrixSpread = 0.1;    // of each entry
 constexpr double kScaleSpread = 0.3;
 constexpr double kDriftSpread = 0.01;  // s/s
-// Controls that no reading touches move little; 1 m and 1 rad are far above what any control is known to.
+// Controls that no reading depends on move little; 1 m and 1 rad are far above the uncertainty of any
+// control.
 constexpr double kControlInformation = 1;
 
 using SplineBlock = Eigen::Matrix<double, 2, kSplineColumns>;
 
-// Two directions across gravity.
+// Two directions perpendicular to gravity.
 Eigen::Matrix<double, 3, 2> gravityTangent(const Eigen::Vector3d& gravity) {
   const Eigen::Vector3d direction = gravity.normalized();
   Eigen::Index smallest = 0;
@@ -64,7 +65,7 @@ struct BatchProblem::Sum {
   ArrowSystem system;
   double cost = 0;
   bool robust;
-  bool probes;  ///< a right side for each kind, of random signs
+  bool probes;  ///< one right-hand side of random signs per kind of residual
   Random signs{1, 77};
   std::vector<int> columns;
   Eigen::MatrixXd J;
@@ -118,7 +119,7 @@ void BatchProblem::layOut() {
 
 void BatchProblem::hold(int first, int count, bool held) { std::fill_n(held_.begin() + first, count, held); }
 
-// A bias stands before the control in the middle of the segment where it begins.
+// A bias is placed before the control in the middle of the segment where it begins.
 int BatchProblem::controlColumn(std::size_t control) const {
   const auto every = static_cast<std::size_t>(state_.bias_every);
   const std::size_t before =
@@ -461,7 +462,7 @@ bool BatchProblem::solve(int iterations, bool robust, double settled) {
     trial.state_ = moved(step);
     ArrowSystem next = emptySystem();
     const double next_cost = trial.assemble(next, robust);
-    // Corners that the lens loses leave the sum: a little above is no failure.
+    // Corners that the lens can no longer project leave the sum, so a slight increase is no failure.
     if (std::isfinite(next_cost) && next_cost <= cost * (1 + 1e-9)) {
       state_ = std::move(trial.state_);
       cost = next_cost;

@@ -36,11 +36,11 @@ constexpr int rotation(std::size_t camera) { return lens(camera) + kLensParamete
 constexpr int position(std::size_t camera) { return rotation(camera) + 3; }
 inline constexpr int kShift = kPerCamera * static_cast<int>(kMaxCameras);
 inline constexpr int kReadout = kShift + 1;
-inline constexpr int kGravity = kReadout + 1;  ///< two turns of its direction [rad]
+inline constexpr int kGravity = kReadout + 1;  ///< two rotations of its direction [rad]
 inline constexpr int kGyro = kGravity + 2;     ///< 3 x 3, row by row
 inline constexpr int kAccel = kGyro + 9;       ///< xx yx yy zx zy zz
-inline constexpr int kScale = kAccel + 6;      ///< of the board: only to test its size
-inline constexpr int kDrift = kScale + 1;      ///< of the images' clock: only to test it
+inline constexpr int kScale = kAccel + 6;      ///< of the board: only for testing its size
+inline constexpr int kDrift = kScale + 1;      ///< of the images' clock: only for testing
 inline constexpr int kColumns = kDrift + 1;
 }  // namespace batch
 
@@ -52,7 +52,7 @@ struct SeenCorner {
 };
 
 struct SeenView {
-  double time = 0;  ///< s of the images' clock since the origin
+  double time = 0;  ///< s, on the images' clock since the origin
   std::size_t camera = 0;
   std::vector<SeenCorner> corners;
 };
@@ -71,14 +71,14 @@ struct BatchData {
 
 struct BatchState {
   SplineTrajectory spline;                        ///< T_board_body
-  std::vector<Eigen::Matrix<double, 6, 1>> bias;  ///< gyro, accel; the first at spline.startTime()
-  int bias_every = 1;                             ///< knots
+  std::vector<Eigen::Matrix<double, 6, 1>> bias;  ///< gyro, accelerometer; the first at spline.startTime()
+  int bias_every = 1;                             ///< distance in knots
   std::size_t camera_count = 0;
   std::array<CameraModel, kMaxCameras> camera;
   std::array<SE3, kMaxCameras> T_body_cam;
   double shift = 0;                                   ///< s, t_imu = t_image + shift
   double readout = 0;                                 ///< s
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< m/s^2 in board axes, of known length
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< m/s^2 in board axes; its length is known
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
   double scale = 1;
@@ -88,7 +88,7 @@ struct BatchState {
   [[nodiscard]] Eigen::Matrix<double, 6, 1> biasAt(double time) const;
 };
 
-/// Standard deviations that weigh the residuals, and what the residuals say of them.
+/// Standard deviations that weight the residuals, updated from the residuals.
 struct BatchNoise {
   double corner = 0.2;  ///< px per axis
   double gyro = 1;      ///< times the density's
@@ -100,38 +100,40 @@ inline constexpr int kResidualKinds = 3;
 
 class BatchProblem {
  public:
-  /// `data` and `target` must outlive this. Priors keep what the log does not show near its start: see the
-  /// source.
+  /// `data` and `target` must outlive this object. Priors keep values that the log does not determine near
+  /// their start; see the source.
   BatchProblem(const BatchData& data, BatchState state, const BatchNoise& noise);
 
   [[nodiscard]] const BatchState& state() const { return state_; }
   [[nodiscard]] const BatchNoise& noise() const { return noise_; }
   void setNoise(const BatchNoise& noise) { noise_ = noise; }
-  /// Columns from `first` on, `count` of them, keep their values.
+  /// Fixes `count` columns from `first` on.
   void hold(int first, int count, bool held = true);
   [[nodiscard]] bool held(int column) const { return held_[static_cast<std::size_t>(column)]; }
   void setReadout(double readout) { state_.readout = readout; }
 
-  /// Iterates until a further step would gain less than `settled` squared sigmas. `robust`: Huber's weights
-  /// on corners. False if the steps did not settle.
+  /// Iterates until a further step would gain less than `settled` squared sigmas. `robust`: Huber weights on
+  /// corners. False: did not converge.
   bool solve(int iterations, bool robust, double settled);
-  /// Half as far apart knots; the motion stays.
+  /// Halves the distance of the knots without changing the motion.
   void refineSpline();
 
   /// Sum of squares over the noise.
   [[nodiscard]] double cost(Residuals which) const;
-  [[nodiscard]] std::size_t count(Residuals which) const;  ///< of them
-  /// Counts minus the unknowns that each kind determines, by a random probe of the trace (Hutchinson 1990).
+  [[nodiscard]] std::size_t count(Residuals which) const;  ///< number of residuals
+  /// Number of residuals of each kind minus the unknowns it determines, by a random estimate of the trace
+  /// (Hutchinson 1990).
   [[nodiscard]] std::array<double, kResidualKinds> redundancies() const;
-  /// Of the calibration's columns, then of the mean gyro and accelerometer bias. Held ones have variance 1.
+  /// Covariance of the calibration's columns, followed by the mean gyro and accelerometer biases. Fixed
+  /// columns have variance 1.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
-  /// The step that the calibration would take [same units], with what is free now.
+  /// The next step of the calibration [same units], with the columns that are free now.
   [[nodiscard]] Eigen::VectorXd nextStep() const;
   [[nodiscard]] int chainSize() const { return chain_; }
   [[nodiscard]] Eigen::Matrix<double, 6, 1> meanBias() const;
 
   [[nodiscard]] double seconds(const SeenView& view, const SeenCorner& corner) const;
-  /// False if the corner has no pixel.
+  /// False: the corner has no pixel.
   bool residual(const SeenView& view, const SeenCorner& corner, Eigen::Vector2d& pixels) const;
   /// Reading - model.
   [[nodiscard]] Eigen::Matrix<double, 6, 1> residual(const TimedReading& reading) const;
@@ -139,8 +141,8 @@ class BatchProblem {
     return time >= state_.spline.startTime() && time < state_.spline.endTime();
   }
 
-  /// Fills `system`, which is emptySystem(); with `probes` random signs of one kind after the other take the
-  /// residuals' place. The sum of weighted squares.
+  /// Fills `system`, which is emptySystem(), and returns the sum of weighted squares. With `probes`, random
+  /// signs replace the residuals, one kind after the other.
   double assemble(ArrowSystem& system, bool robust, bool probes = false) const;
   [[nodiscard]] ArrowSystem emptySystem(int rights = 1) const {
     return {chain_, width_, batch::kColumns, rights};
@@ -161,7 +163,7 @@ class BatchProblem {
   const BatchData& data_;
   BatchState state_;
   BatchNoise noise_;
-  double middle_ = 0;  ///< s: where a drift of the clock does nothing
+  double middle_ = 0;  ///< s: reference time of the clock's drift
   std::array<bool, batch::kColumns> held_{};
   std::array<Eigen::Matrix<double, 8, 1>, kMaxCameras> lens_start_;
   int chain_ = 0;

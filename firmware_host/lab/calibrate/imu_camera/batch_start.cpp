@@ -14,20 +14,20 @@ namespace swiftlet {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
-constexpr double kMostPoseRms = 10;    // px: a rolling shutter bends a board by some pixels
+constexpr double kMostPoseRms = 10;    // px; a rolling shutter bends a board by some pixels
 constexpr double kLongestTurn = 0.25;  // s between two poses: beyond, turns about changing axes do not add up
 constexpr std::size_t kFewestPoses = 100;
-// Share of the camera's turns that the gyro has to explain. Poses from a board are good to 0.1 deg, turns of
-// a tenth of a second by hand are some degrees: a matching gyro explains 0.99.
+// Least share of the camera's rotations that the gyro must explain. Poses from a board are accurate to 0.1
+// deg, rotations by hand are some degrees in a tenth of a second: a matching gyro explains 0.99.
 constexpr double kLeastExplained = 0.9;
 constexpr double kMirrorSigmas = 5;  // gain 1/2 sigma^2
-constexpr double kLeastTurn = 0.2;   // deg, root mean square a turn: less is a rig at rest
-// A bias follows its walk within a part of the time at which the walk is as large as the white noise.
+constexpr double kLeastTurn = 0.2;   // deg rms per turn; less means that the rig is at rest
+// Distance of bias knots, as a share of the time after which the random walk equals the white noise.
 constexpr double kBiasPart = 0.25;
 constexpr int kMostBiasKnots = 4;
 
 struct TimedPose {
-  double time = 0;  ///< s of the images' clock
+  double time = 0;  ///< s, on the images' clock
   SE3 T_board_cam0;
 };
 
@@ -37,7 +37,7 @@ std::vector<TimedPose> posesOf(const CalibrationTarget& target, const std::vecto
   for (const BoardView& view : views) {
     const double time = (view.stamp - origin).seconds();
     if (view.camera >= cameras.camera_count) continue;
-    if (!poses.empty() && time - poses.back().time < 1e-3) continue;  // camera 0 has been taken
+    if (!poses.empty() && time - poses.back().time < 1e-3) continue;  // camera 0's pose has been taken
     const std::optional<SE3> T_cam_board =
         boardPose(target, cameras.camera[view.camera].model, view, kMostPoseRms);
     if (!T_cam_board) continue;
@@ -148,7 +148,7 @@ BatchStart startBatch(const CalibrationTarget& target, const std::vector<BoardVi
     for (const BoardCorner& corner : view.corners) {
       seen.corners.push_back({corner.id, target.corner(corner.id), corner.pixel, false});
     }
-    // In order of a rolling shutter's rows, so that corners of one segment follow each other.
+    // In the order of a rolling shutter's rows, so that corners of one segment are adjacent.
     std::stable_sort(seen.corners.begin(), seen.corners.end(),
                      [](const SeenCorner& a, const SeenCorner& b) { return a.pixel.y() < b.pixel.y(); });
     start.data.views.push_back(std::move(seen));
@@ -162,7 +162,7 @@ BatchStart startBatch(const CalibrationTarget& target, const std::vector<BoardVi
   state.T_body_cam[1] = T_body_cam0 * cameras.T_cam1_cam0.inverse();
   for (std::size_t c = 0; c < cameras.camera_count; ++c) state.camera[c] = cameras.camera[c].model;
 
-  // The spline covers what both sensors saw.
+  // The spline covers the time seen by both sensors.
   const double begin = std::max(poses.front().time + fit->shift, start.data.readings.front().time);
   const double end = std::min(poses.back().time + fit->shift, start.data.readings.back().time);
   const auto segments = static_cast<std::size_t>(std::max((end - begin) / spacing, 1.0));

@@ -1,5 +1,6 @@
 #pragma once
-// Where the batch begins: the board's poses, the gyro beside the camera's turns, gravity, a first spline.
+// Initial values of the batch: the board's poses, comparison of gyro and camera rotations, gravity, a first
+// spline.
 
 #include <optional>
 #include <string>
@@ -19,11 +20,11 @@ struct BatchStart {
   BatchState state;
   Stamp origin;
   MotionFit fit;
-  std::vector<std::string> reasons;  ///< what makes the batch pointless; not empty: `state` is not set
+  std::vector<std::string> reasons;  ///< why the batch would fail; if not empty, `state` is not set
 };
 
-/// `spacing` [s]: of the spline's knots. A board that the lens of `cameras` does not fit to within some
-/// pixels is left out of the start.
+/// `spacing` [s]: of the spline's knots. Views that the lens of `cameras` does not fit to within some pixels
+/// are not used for the start.
 BatchStart startBatch(const CalibrationTarget& target, const std::vector<BoardView>& views,
                       const std::vector<ImuSample>& samples, const ImuNoise& noise,
                       const CameraSolution& cameras, double spacing);

@@ -17,23 +17,23 @@ constexpr double kToMm = 1e3;
 constexpr double kToMilliseconds = 1e3;
 constexpr double kToPercent = 100;
 
-// A result is refused where a standard deviation is above what a flight notices.
+// A result is refused if a standard deviation is large enough to affect a flight.
 constexpr double kMostTurnSigma = 0.05;    // deg: a pixel at 1000 px of focal length
 constexpr double kMostLeverSigma = 3;      // mm: half of what two good tools differ by
 constexpr double kMostShiftSigma = 0.2;    // ms: at 3 rad/s 0.03 deg
 constexpr double kMostLensSigma = 1e-3;    // of the focal length
-constexpr double kMostMatrixSigma = 0.5;   // %: what an uncalibrated MEMS sensor is good to
+constexpr double kMostMatrixSigma = 0.5;   // %; accuracy of an uncalibrated MEMS sensor
 constexpr double kMostMatrix = 0.05;       // of an entry, from the identity: beyond, axes or units are wrong
-constexpr double kMostResidual = 3;        // times the noise that was given
+constexpr double kMostResidual = 3;        // times the given noise
 constexpr double kMostCornerNoise = 2e-3;  // rad
 constexpr double kMostOutliers = 0.05;     // share of the corners
-constexpr double kTestSigmas = 5;          // of one test in a calibration that should never fail by chance
-constexpr double kScaleMatters = 0.005;    // of the board: gravity anywhere on Earth is within it
+constexpr double kTestSigmas = 5;          // for one test, so that a good calibration never fails by chance
+constexpr double kScaleMatters = 0.005;    // of the board; gravity anywhere on Earth varies less
 constexpr double kDriftMatters = 5e-6;     // s/s: 0.15 ms from the middle of a minute to its end
-constexpr double kShiftOfOneClock = 0.1;   // s: exposure, transfer and filters stay below
+constexpr double kShiftOfOneClock = 0.1;   // s; exposure, transfer and filters take less
 constexpr double kLeastRate = 0.15;        // rad/s, root mean square about each axis
 constexpr double kLeastForce = 0.3;        // m/s^2, root mean square along each axis
-constexpr double kToldTurn = 10;           // deg from where the IMU was thought to be
+constexpr double kToldTurn = 10;           // deg from the given orientation of the IMU
 
 struct NamedColumn {
   int column = 0;
@@ -99,7 +99,7 @@ std::vector<NamedColumn> columnsOf(const BatchState& state, bool rolling,
   return all;
 }
 
-/// a - b, column by column.
+/// a - b, per column.
 Eigen::VectorXd differenceOf(const BatchState& a, const BatchState& b) {
   Eigen::VectorXd d = Eigen::VectorXd::Zero(batch::kColumns);
   for (std::size_t c = 0; c < a.camera_count; ++c) {
@@ -121,7 +121,7 @@ Eigen::VectorXd differenceOf(const BatchState& a, const BatchState& b) {
   return d;
 }
 
-/// "x (1.00 0.02 0.01)": the axis of camera 0 that is nearest, and the direction.
+/// "x (1.00 0.02 0.01)": the nearest axis of camera 0, and the direction.
 std::string axisOfCamera(const Eigen::Vector3d& direction) {
   Eigen::Index axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
@@ -208,7 +208,7 @@ void BatchVerdict::judge(BatchProblem problem, ImuCameraSolution& solution) cons
   judgeMatrices(solution, reasons);
   judgeHalves(problem, reasons);
 
-  // Two further unknowns, which a good calibration does not want.
+  // Two additional unknowns that a good calibration does not need.
   problem.hold(batch::kScale, 1, false);
   problem.hold(batch::kDrift, 1, false);
   const Eigen::VectorXd step = problem.nextStep();
@@ -290,7 +290,7 @@ void BatchVerdict::judgeMotion(const BatchProblem& problem, bool known,
                     axisOfCamera(turn.direction), kToDeg * turn.rms));
   }
   const Weakest force = weakestOf(forces / count);
-  // Turns alone show much of the accelerometer: gravity changes its direction.
+  // Rotations alone reveal much about the accelerometer, because gravity changes its direction.
   if (!known && force.rms < kLeastForce) {
     Eigen::Index axis = 0;
     force.direction.cwiseAbs().maxCoeff(&axis);

@@ -1,5 +1,5 @@
 #pragma once
-// What the batch found, in the units of users, and whether it is to be trusted.
+// Results of the batch in users' units, and whether they can be trusted.
 
 #include <array>
 
@@ -19,14 +19,14 @@ struct BatchVerdict {
   std::array<BatchState, 2> halves;
   std::array<Eigen::MatrixXd, 2> half_covariances;
 
-  /// Everything but the reasons.
+  /// The solution without the reasons.
   [[nodiscard]] ImuCameraSolution solutionOf(const BatchProblem& problem) const;
   /// Adds the reasons.
   void judge(BatchProblem problem, ImuCameraSolution& solution) const;
 
  private:
   void judgeResiduals(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;
-  /// `known`: the standard deviations are small enough.
+  /// `known`: whether the standard deviations are small enough.
   void judgeMotion(const BatchProblem& problem, bool known, std::vector<std::string>& reasons) const;
   void judgeMatrices(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;
   bool judgeSigmas(const ImuCameraSolution& solution, std::vector<std::string>& reasons) const;

@@ -16,15 +16,15 @@ namespace {
 constexpr double kFirstSpacing = 0.1;   // s
 constexpr double kReadingsPerKnot = 4;  // at least
 constexpr double kOutlierSigmas = 4;
-constexpr double kRefineSigmas = 5;        // of chi^2 above what as many more unknowns gain from noise
-constexpr double kRollingSigmas = 4;       // of the readout, above zero
-constexpr double kFirstCornerSigma = 0.3;  // px: until the residuals say
+constexpr double kRefineSigmas = 5;        // of chi^2 above what the same number of unknowns gains from noise
+constexpr double kRollingSigmas = 4;       // of the readout, from zero
+constexpr double kFirstCornerSigma = 0.3;  // px, until estimated from the residuals
 constexpr int kFirstSteps = 15;
 constexpr int kSteps = 12;
 constexpr double kRoughly = 1;  // squared sigmas that a further step would gain
 constexpr double kSettled = 1e-4;
 
-/// Corners beyond four sigma, by the median of the residuals. The number of outliers.
+/// Marks corners beyond four sigma, by the median of the residuals. Returns the number of outliers.
 std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& sigma) {
   std::vector<double> sizes;
   for (const SeenView& view : data.views) {
@@ -52,7 +52,7 @@ std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& s
   return outliers;
 }
 
-/// Weights from the residuals.
+/// Sets the weights from the residuals.
 void weigh(BatchProblem& problem) {
   const std::array<double, kResidualKinds> left = problem.redundancies();
   const auto factor = [&](Residuals which) {
@@ -65,7 +65,7 @@ void weigh(BatchProblem& problem) {
   problem.setNoise(noise);
 }
 
-/// Sums of squares, each kind over `noise`.
+/// Sum of squares with each kind weighted by `noise`.
 double costIn(const BatchProblem& problem, const BatchNoise& noise) {
   const BatchNoise& own = problem.noise();
   const auto square = [](double x) { return x * x; };
@@ -74,14 +74,14 @@ double costIn(const BatchProblem& problem, const BatchNoise& noise) {
          problem.cost(Residuals::kAccel) * square(own.accel / noise.accel);
 }
 
-/// Finer knots while they explain more than noise.
+/// Refines the knots while this explains more than noise.
 void chooseKnots(BatchProblem& problem, double rate_hz) {
   while (problem.state().spline.spacing() / 2 >= kReadingsPerKnot / rate_hz) {
     const BatchProblem coarse = problem;
     problem.refineSpline();
     problem.solve(kSteps, false, kRoughly);
     weigh(problem);
-    // Both in the noise that the finer spline leaves.
+    // Both weighted by the noise estimated with the finer spline.
     const double gain = costIn(coarse, problem.noise()) - costIn(problem, problem.noise());
     const double more = problem.chainSize() - coarse.chainSize();
     if (gain < more + kRefineSigmas * std::sqrt(2 * more)) return;
@@ -124,7 +124,7 @@ ImuCameraSolution calibrateImuCamera(const ImuCameraInput& input,
   tell(0.05);
   BatchProblem problem(start.data, start.state, {kFirstCornerSigma, 1, 1});
 
-  // Coarse motion first, with what shapes it least held.
+  // Coarse motion first, with the parameters fixed that influence it least.
   for (std::size_t c = 0; c < start.state.camera_count; ++c) problem.hold(batch::lens(c), kLensParameters);
   problem.hold(batch::kReadout, 1);
   problem.hold(batch::kGyro, 9 + 6);

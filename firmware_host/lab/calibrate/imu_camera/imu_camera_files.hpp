@@ -1,5 +1,5 @@
 #pragma once
-// What was found about a rig with an IMU, for people, for flights and for other programs.
+// A calibrated rig with an IMU as text for people, and as files for flights and other programs.
 
 #include <string>
 
@@ -11,8 +11,8 @@ namespace swiftlet {
 /// A line per value with its standard deviation; empty if nothing was found.
 [[nodiscard]] std::string describe(const ImuCameraSolution& solution);
 
-/// As flights read it: lenses, extrinsics, time offset, readout, the IMU's matrices. `noise`: densities as
-/// told.
+/// The calibration as used by flights: lenses, extrinsics, time offset, readout, the IMU's matrices. `noise`:
+/// the given densities.
 [[nodiscard]] Calibration calibrationOf(const ImuCameraSolution& solution, const ImuNoise& noise);
 
 }  // namespace swiftlet

@@ -1,5 +1,5 @@
 #pragma once
-// What is found about a rig of cameras and an IMU that moved in front of a board.
+// Calibration of a rig of cameras and an IMU that moved in front of a board.
 
 #include <Eigen/Core>
 #include <string>
@@ -12,11 +12,11 @@
 
 namespace swiftlet {
 
-/// A parameter and how well it is known.
+/// A parameter and its standard deviation.
 struct SolvedValue {
   std::string name;  ///< "cam0 fx", "T_body_cam0 rotation x", "gyro scale y"
   std::string unit;  ///< "px", "deg", "mm", "ms", "%"
-  double value = 0;  ///< in `unit`; of a rotation, of the rotation vector
+  double value = 0;  ///< in `unit`; for rotations a component of the rotation vector
   double sigma = 0;  ///< in `unit`
 };
 
@@ -28,7 +28,7 @@ struct ImuResidual {
 
 struct ImuCameraSolution {
   Rig rig;  ///< body = IMU: its axes are the accelerometer's
-  /// reading = matrix true + bias, Kalibr's direction; accelerometer lower triangular, gyro full.
+  /// reading = matrix true + bias, as in Kalibr; accelerometer lower triangular, gyro full.
   Eigen::Matrix3d gyro_matrix = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d accel_matrix = Eigen::Matrix3d::Identity();
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();      ///< rad/s, mean over the log
@@ -37,12 +37,12 @@ struct ImuCameraSolution {
   std::vector<SolvedValue> values;                          ///< every parameter above, with its sigma
   Eigen::MatrixXd covariance;                               ///< of `values`, in their units
   double corner_sigma = 0;                                  ///< px per axis
-  double gyro_sigma = 0;                                    ///< residual over what the noise says; 1 is right
+  double gyro_sigma = 0;                                    ///< residual over the given noise; 1 is expected
   double accel_sigma = 0;
   std::vector<ImuResidual> imu_residuals;
   std::vector<SolvedView> views;
   std::vector<CornerResidual> corners;
-  std::vector<std::string> reasons;  ///< why this is not to be trusted; empty: good
+  std::vector<std::string> reasons;  ///< why this cannot be trusted; empty: good
 };
 
 }  // namespace swiftlet

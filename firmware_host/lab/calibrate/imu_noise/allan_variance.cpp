@@ -7,7 +7,7 @@ void AllanVariance::add(const ImuSix& reading) {
   any_ = true;
   if (count_ == 0) {
     integral_.setZero();
-    keep(0);  // where it begins
+    keep(0);  // the start of the integral
   }
   integral_ += reading - reference_;
   ++count_;
@@ -28,7 +28,7 @@ void AllanVariance::keep(std::size_t index) {
     octaves_.back().sums.resize(index == 0 ? 5 : 1);
   }
   Octave& octave = octaves_[index];
-  // The integral is zero where it begins, which every octave keeps.
+  // The integral starts at zero; every octave keeps this value.
   if (octave.kept == 0 && index > 0) octave.ring[octave.kept++].setZero();
   octave.ring[octave.kept++ % octave.ring.size()] = integral_;
   for (std::size_t i = 0; i < octave.sums.size(); ++i) addTerm(octave, kSteps >> i, octave.sums[i]);
@@ -41,7 +41,7 @@ void AllanVariance::addTerm(const Octave& octave, std::size_t steps, Octave::Sum
   };
   sum.squares += (before(0) - 2 * before(steps) + before(2 * steps)).cwiseAbs2();
   sum.terms += 1;
-  // The first term covers two clusters, each further one a stride more.
+  // The first term covers two clusters; each further one adds a stride.
   sum.pairs += octave.kept == 2 * steps + 1 ? 1 : 1 / static_cast<double>(2 * steps);
 }
 

@@ -15,10 +15,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::size_t kProbed = 4000;  // samples that tell rate and units
+constexpr std::size_t kProbed = 4000;  // samples used to find rate and units
 constexpr double kHolePeriods = 10;
 constexpr double kLongestLog = 10 * 86400;  // s
-constexpr double kLeastRest = 10;           // s: clusters of 1 s are seen ten times
+constexpr double kLeastRest = 10;           // s; enough for ten clusters of 1 s
 constexpr double kMostMotion = 0.5;         // of the log
 constexpr std::size_t kMotionLines = 8;
 constexpr std::array<const char*, 6> kNames = {"gyro x", "gyro y", "gyro z", "accel x", "accel y", "accel z"};
@@ -29,7 +29,8 @@ ImuSix six(const ImuSample& sample) {
   return reading;
 }
 
-/// Mean time between samples, without holes: jitter cancels. The median of the first says what a hole is.
+/// Mean time between samples without gaps, in which jitter cancels. The median of the first periods defines a
+/// gap.
 class Periods {
  public:
   void add(Stamp stamp) {
@@ -64,7 +65,7 @@ class Periods {
   std::size_t count_ = 0;
 };
 
-/// Blocks of a span that no log has would fill the memory.
+/// Refuses time spans that no log has; their blocks would fill the memory.
 void checkSpan(const std::string& log, const std::vector<ImuSample>& probe, Stamp last, Stamp stamp) {
   if ((stamp - probe.front().stamp).seconds() < kLongestLog) return;
   throw InputError(
@@ -101,7 +102,7 @@ void addRemarks(ImuNoiseResult& result) {
   }
   const double nyquist = 2 / result.rate_hz;
   const auto quantized = axesWhere([&](int i) {
-    // The variance's parts at two periods.
+    // Compares the parts of the variance at two periods.
     return at(i).quantization > 0 &&
            3 * std::pow(at(i).quantization / nyquist, 2) > std::pow(at(i).density.value, 2) / nyquist;
   });

@@ -1,9 +1,9 @@
 #pragma once
-// The noise of an IMU from a log at rest: what `swiftlet calibrate imu-noise` calls.
+// Measures the noise of an IMU from a log at rest: called by `swiftlet calibrate imu-noise`.
 //
-// The log is read twice: for motion, then for the Allan variance of what stands still. Samples are counted,
-// not placed by their stamps, so that jitter of the stamps has no effect; a hole of more than ten periods
-// interrupts. Cost: 2 us a sample of a text file. Memory: still_spans.hpp.
+// The log is read twice: to find motion, then for the Allan variance of the parts at rest. Samples are
+// counted and not placed by their stamps, so that jitter of the stamps has no effect; a gap of more than ten
+// periods interrupts. Cost: 2 us per sample of a text file. Memory: see still_spans.hpp.
 
 #include <array>
 #include <cstdint>
@@ -25,16 +25,16 @@ struct ImuNoiseResult {
   std::vector<AllanPoint> points;
   std::array<AxisNoise, 6> axis;     ///< gyro x y z, accelerometer x y z
   std::vector<std::string> motions;  ///< where the log moves
-  std::vector<std::string> remarks;  ///< what limits the result, a sentence each with its remedy
+  std::vector<std::string> remarks;  ///< what limits the result, one sentence each with its remedy
   std::vector<std::string> warnings;
 };
 
-/// InputError if the log cannot be read, or has no rest of ten seconds.
+/// InputError if the log cannot be read, or has no ten seconds at rest.
 ImuNoiseResult measureImuNoise(const std::string& log);
 
-/// Kalibr's imu.yaml: of each kind the largest axis. A random walk that is not known is a comment.
+/// Kalibr's imu.yaml: for each quantity the largest axis. An unknown random walk is written as a comment.
 std::string imuNoiseYaml(const ImuNoiseResult& result);
-/// What was found in words, for the terminal.
+/// The result as text for the terminal.
 std::string imuNoiseText(const ImuNoiseResult& result);
 
 }  // namespace swiftlet

@@ -1,10 +1,9 @@
 #pragma once
-// The IMU's readings of a log, one at a time and in the sensor's own axes: for logs of hours.
+// Reads a log's IMU samples one at a time in the sensor's own axes, also from logs of several hours.
 //
-// Logs: EuRoC folders (imu0 is enough) and archives of them, an imu0/data.csv alone (packed with xz too),
-// bags and recordings. No calibration is needed. Stamps rise: samples that do not are left out.
-// Memory: a row for files on disk; archives and packed files their text; bags 24 bytes a message.
-// Errors: InputError.
+// Logs: EuRoC folders (imu0 is enough) and archives of them, an imu0/data.csv alone (also packed by xz), bags
+// and recordings. No calibration is needed. Samples whose stamps do not rise are omitted. Memory: one row for
+// files on disk; the text for archives and packed files; 24 bytes per message for bags. Errors: InputError.
 
 #include <functional>
 #include <string>
@@ -14,7 +13,7 @@
 
 namespace swiftlet {
 
-/// What was passed over goes to `warnings`.
+/// Omitted samples are reported in `warnings`.
 void eachImuSample(const std::string& log, const std::function<void(const ImuSample&)>& take,
                    std::vector<std::string>& warnings);
 

@@ -15,14 +15,15 @@ constexpr int kTerms = 4;
 enum Term : std::uint8_t { kWhite, kWalk, kFlat, kQuantization };
 using Terms = Eigen::Vector4d;
 
-// 2 log likelihood that a further term has to gain: one in a hundred by chance.
+// Least gain of 2 log likelihood for an additional term: one in a hundred by chance.
 constexpr double kGain = 6.6;
-// A fit this good, in sigmas RMS, ends the search for the shortest cluster.
+// RMS misfit in sigmas at which the search for the shortest cluster ends.
 constexpr double kGoodMisfit = 1.6;
-constexpr double kLongestStart = 1.0;  // s: white noise is read above this at the latest
+constexpr double kLongestStart = 1.0;  // s; the white noise is fitted from here at the latest
 constexpr std::size_t kFewestPoints = 4;
-// Pairs of clusters of a random walk are not independent, neither of their neighbours nor of other octaves'.
-// By how much its sigma is larger than as if they were: found over simulated logs of 20 minutes to 2 hours.
+// Pairs of clusters of a random walk are not independent, neither of their neighbours nor of other octaves.
+// Factor by which its sigma is larger than for independent pairs, found from simulated logs of 20 minutes to
+// 2 hours.
 constexpr double kWalkSigma = 1.35;
 const double kFlatFactor = 2 * std::numbers::ln2 / std::numbers::pi;
 
@@ -31,12 +32,13 @@ Terms shape(double tau) { return {1 / tau, tau / 3, kFlatFactor, 3 / (tau * tau)
 struct Fit {
   Terms squares = Terms::Zero();
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();   // of the squares; zero for absent terms
-  double cost = std::numeric_limits<double>::infinity();  // -2 log likelihood and what the terms must gain
+  double cost = std::numeric_limits<double>::infinity();  // -2 log likelihood plus what the terms must gain
   double misfit = 1;
   bool good = false;
 };
 
-/// Points from `first` on, with the terms of `mask`: Fisher scoring. Not good where a term is not positive.
+/// Fits the terms in `mask` to the points from `first` on, by Fisher scoring. Not good if a term is not
+/// positive.
 Fit fitTerms(const std::vector<AllanPoint>& points, int axis, std::size_t first, unsigned mask,
              bool keep_negative = false) {
   std::array<int, kTerms> used{};
@@ -63,13 +65,13 @@ Fit fitTerms(const std::vector<AllanPoint>& points, int axis, std::size_t first,
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Eigen::VectorXd weight = half.cwiseQuotient(model.cwiseAbs2());
     information = A.transpose() * weight.asDiagonal() * A;
-    // Terms differ by many powers of ten.
+    // Terms differ by many orders of magnitude.
     const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
     squares = scale.asDiagonal() *
               scaled.ldlt().solve(scale.asDiagonal() * (A.transpose() * weight.cwiseProduct(seen)));
     const Eigen::VectorXd next = A * squares;
-    // A model that is not positive has no likelihood: a part of the way then.
+    // A model that is not positive has no likelihood, so the step is limited.
     model = next.cwiseMax(0.1 * model).cwiseMin(10 * model);
   }
   if (!squares.allFinite() || (!keep_negative && squares.minCoeff() <= 0)) return fit;

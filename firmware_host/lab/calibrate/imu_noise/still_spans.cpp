@@ -9,20 +9,20 @@ namespace swiftlet {
 namespace {
 
 constexpr std::array<const char*, 6> kAxes = {"gyro x", "gyro y", "gyro z", "accel x", "accel y", "accel z"};
-// Sensors' noise drifts by some ten per cent over hours of warming up; a hand on the table doubles it.
+// Sensor noise drifts by some ten per cent over hours of warming up; a hand on the table doubles it.
 constexpr double kScatterTimes = 1.5;
-// Of the scatter of a deviation from n samples, 1 / sqrt(2 n).
+// In sigmas of a deviation estimated from n samples, 1 / sqrt(2 n).
 constexpr double kScatterSigmas = 8;
-// Steps between neighbouring blocks, in sigmas of such steps; they are not normal while a sensor warms up.
+// Steps between neighbouring blocks, in sigmas of such steps, which are not normal while a sensor warms up.
 constexpr double kStepSigmas = 10;
-// Steps this small are no motion, whatever the sensor: a thousandth of a degree of tilt.
+// Smaller steps are no motion for any sensor: a thousandth of a degree of tilt.
 constexpr double kLeastGyroStep = 1e-5;   // rad/s
 constexpr double kLeastAccelStep = 2e-4;  // m/s^2
-// docs/imu.md: standing stays below, flying above, by scatter of 0.1 s means over a second.
+// docs/imu.md: a rig at rest is below, a flight above, by the scatter of 0.1 s means over a second.
 constexpr double kMostSlowGyro = 0.005;  // rad/s
 constexpr double kMostSlowAccel = 0.05;  // m/s^2
 
-/// The value that a quarter of them is below.
+/// The lower quartile.
 double quarter(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 4);
@@ -89,7 +89,7 @@ void StillSpans::finish() {
       if (i > 0 && full(i - 1)) steps.push_back(std::abs(blocks_[i].mean[axis] - blocks_[i - 1].mean[axis]));
     }
     quiet_[axis] = quarter(deviations);
-    // A quarter of normal numbers is below 0.319 of their sigma.
+    // The lower quartile of normal absolute values is 0.319 sigma.
     constexpr double kQuarterOfNormal = 0.3186;
     const double step = std::max(kStepSigmas * quarter(steps) / kQuarterOfNormal,
                                  axis < 3 ? kLeastGyroStep : kLeastAccelStep);

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kUsed = "#1f6fb4";
 constexpr const char* kLeftOut = "#cf4646";
 constexpr std::size_t kFewestInCell = 5;
-constexpr std::size_t kRows = 25;  // of a table
+constexpr std::size_t kRows = 25;  // per table
 constexpr std::size_t kMostFrusta = 150;
 
 ImageGrid gridOf(const BoardEvidence& evidence, std::size_t camera) {
@@ -70,7 +70,7 @@ Plot vectorPlot(const BoardEvidence& evidence, std::size_t camera) {
     if (cell.count >= kFewestInCell) most = std::max(most, cell.mean.norm());
   }
   ImageDrawing image(evidence.camera[camera].width(), evidence.camera[camera].height());
-  // The longest is a cell and a half.
+  // The longest arrow is one and a half cells.
   const double scale = most > 0 ? 1.5 * grid.size() / most : 1;
   for (const ImageCell& cell : grid.cells()) {
     const CellMean& mean = cells[cell.index];
@@ -129,7 +129,7 @@ Plot viewPlot(const BoardEvidence& evidence) {
   return plot;
 }
 
-/// Both sides: the page shows a triangle from its front.
+/// Adds both orientations if `both`: the page shows a triangle only from its front.
 void addTriangle(TriangleMesh& mesh, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                  const Eigen::Vector3d& c, std::uint8_t grey, bool both) {
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -161,7 +161,7 @@ TriangleMesh boardMesh(const CalibrationTarget& target) {
   const double margin = target.size / 2;
   constexpr std::uint8_t kPaper = 235;
   constexpr std::uint8_t kPrint = 40;
-  constexpr double kAbove = 1e-3;  // m: the print lies in front of the paper
+  constexpr double kAbove = 1e-3;  // m; draws the print in front of the paper
   quad(low - Eigen::Vector3d::Constant(margin), high + Eigen::Vector3d::Constant(margin), 0, kPaper);
   if (target.hasTags()) {
     for (int id = 0; id < target.cornerCount(); id += 4)
@@ -177,7 +177,7 @@ TriangleMesh boardMesh(const CalibrationTarget& target) {
   return mesh;
 }
 
-/// A pyramid from the camera's centre to a small image in front of it.
+/// A pyramid from the camera's centre to a small image plane in front of it.
 void addFrustum(TriangleMesh& mesh, const SE3& T_board_cam, double size, std::uint8_t grey) {
   const Eigen::Vector3d centre = T_board_cam.translation;
   std::vector<Eigen::Vector3d> corners;

@@ -1,5 +1,5 @@
 #pragma once
-// What views of a board leave to look at, for the pages of `calibrate cameras` and `calibrate imu-camera`.
+// Plots, tables and 3D views of board views, for the pages of `calibrate cameras` and `calibrate imu-camera`.
 
 #include <array>
 #include <cstddef>
@@ -20,29 +20,29 @@ struct BoardEvidence {
   std::array<CameraModel, kMaxCameras> camera;
   SE3 T_cam1_cam0;
   double corner_sigma = 0;       ///< px per axis
-  std::string seen = "corners";  ///< what is seen: of a flight, points
+  std::string seen = "corners";  ///< name of what is seen: "points" for a flight
   CalibrationTarget target;
   std::vector<SolvedView> views;
   std::vector<CornerResidual> corners;
 };
 
-/// A side or corner of the image, in words, and the part of the image's cells that hold used corners.
+/// Share of the image's cells with used corners, and the emptiest part of the image.
 struct Coverage {
   double share = 0;
   std::string
-      emptiest;  ///< "upper left" and so on, where the ninth of the image has the fewest cells with corners
+      emptiest;  ///< "upper left" and so on: the ninth of the image with the fewest cells that have corners
   std::vector<bool> cells;  ///< of ImageGrid
 };
 Coverage coverageOf(const BoardEvidence& evidence, std::size_t camera);
 
-/// Mean residual of each cell of ImageGrid, outliers left out.
+/// Mean residual of each cell of ImageGrid, without outliers.
 struct CellMean {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();  ///< px
   std::size_t count = 0;
 };
 std::vector<CellMean> cellMeans(const BoardEvidence& evidence, std::size_t camera);
 
-/// Part of the corners that was left out.
+/// Share of the corners that were removed as outliers.
 double outlierShare(const BoardEvidence& evidence);
 
 /// Residuals over the image and in a scatter, RMS of each view, coverage.

@@ -1,5 +1,6 @@
 #pragma once
-// The page of a calibration: one HTML file with plain words at the top (docs/report.md, docs/calibration.md).
+// The page of a calibration: one HTML file with a summary in words at the top (docs/report.md,
+// docs/calibration.md).
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -16,16 +17,17 @@ struct CalibrationPage {
   std::string name;
   PageVerdict verdict = PageVerdict::kGood;
   std::string verdict_text;
-  std::vector<std::string> words;  ///< a sentence each
+  std::vector<std::string> words;  ///< one sentence each
   std::vector<Plot> plots;
   std::vector<Table> tables;
   nlohmann::ordered_json scene;  ///< null: no 3D view
 };
 
-/// With the page's program where it is installed, else plain. InputError if the file cannot be written.
+/// Writes the page with its program if that is installed, otherwise a plain one. InputError if the file
+/// cannot be written.
 void writeCalibrationPage(const std::string& path, const CalibrationPage& page);
 
-/// The same as text: `program` is the page of readReportProgram(), empty: plain.
+/// The same as text. `program`: the page of readReportProgram(); empty: plain.
 std::string calibrationHtml(const CalibrationPage& page, const std::string& program,
                             const std::string& program_name);
 

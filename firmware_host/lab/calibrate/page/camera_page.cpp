@@ -16,17 +16,17 @@ namespace {
 constexpr double kToDegrees = 180 / std::numbers::pi;
 constexpr double kToMilli = 1e3;
 
-// A point is seen to 0.45 px of a 460 px lens in flight, 1 mrad (smoother.pixel_sigma). A lens that is known
-// to half of that costs nothing beside it.
+// In flight, a point is seen with 0.45 px at 460 px of focal length, 1 mrad (smoother.pixel_sigma). A lens
+// accurate to half of that adds hardly any error.
 constexpr double kGoodAngle = 0.5e-3;  // rad
-// Two halves of the data differ by twice the sigma where noise is all that is wrong: mrcal's "most important
-// diagnostic". Above twice that the lens model does not fit or something moved.
+// The halves of the data differ by twice the sigma if there is only noise: mrcal's "most important
+// diagnostic". Above twice that, the lens model does not fit or something moved.
 constexpr double kHalvesTimes = 2;
-constexpr double kLeastCoverage = 0.7;       // of the cells; a lens is extrapolated elsewhere
-constexpr double kMostCornerSigma = 1.1e-3;  // rad: 0.5 px of a 460 px lens, the upper end of what is usual
+constexpr double kLeastCoverage = 0.7;       // of the cells; elsewhere the lens is extrapolated
+constexpr double kMostCornerSigma = 1.1e-3;  // rad: 0.5 px of a 460 px lens, the upper end of the usual range
 constexpr double kMostBias = 0.3;            // of corner sigma
 constexpr double kStereoAngle = 0.01 / kToDegrees;  // rad, for each 10 cm of baseline
-constexpr double kStereoLength = 1e-3;              // of the baseline: kBaselinePriorSigma's reason
+constexpr double kStereoLength = 1e-3;              // of the baseline; see kBaselinePriorSigma
 constexpr double kByChance = 3.5;                   // sigmas of a cell's mean, the largest of 200 cells
 
 double percentile(std::vector<double> values, double part) {
@@ -37,7 +37,7 @@ double percentile(std::vector<double> values, double part) {
   return *at;
 }
 
-/// Largest mean residual of a cell, less what chance makes of it.
+/// Largest mean residual of a cell, minus the effect of chance.
 double cellBias(const BoardEvidence& evidence, std::size_t camera) {
   double most = 0;
   const std::vector<CellMean> cells = cellMeans(evidence, camera);
@@ -49,7 +49,7 @@ double cellBias(const BoardEvidence& evidence, std::size_t camera) {
   return most / evidence.corner_sigma;
 }
 
-/// The other model's half has no lens where there was no second solution.
+/// Without a second solution, the halves have no lens.
 bool hasHalves(const SolvedCamera& camera) {
   return camera.halves[0].width() > 0 && camera.halves[1].width() > 0;
 }
@@ -109,7 +109,7 @@ void addLens(const CameraSolution& solution, const BoardEvidence& evidence, std:
     sizes.push_back(difference[k].norm());
     if (!coverage.cells[k] || !difference[k].allFinite() || !std::isfinite(rms_sigmas[k])) continue;
     inside.push_back(sizes.back());
-    squares += 0.5 * difference[k].squaredNorm();  // of an axis
+    squares += 0.5 * difference[k].squaredNorm();  // per axis
     expected += 4 * rms_sigmas[k] * rms_sigmas[k];
   }
   ImageDrawing halves(model.width(), model.height());

@@ -8,7 +8,7 @@
 namespace swiftlet {
 namespace {
 
-/// The flight's sightings as corners of no board, for the drawings that they share.
+/// The flight's sightings as corners without a board, for the shared drawings.
 BoardEvidence evidenceOf(const CheckResult& result) {
   BoardEvidence evidence;
   evidence.camera_count = result.rig.camera_count;

@@ -12,9 +12,9 @@ namespace swiftlet {
 namespace {
 
 constexpr double kCells = 200;
-constexpr std::size_t kMostDots = 12'000;  // a drawing of 150 kB
+constexpr std::size_t kMostDots = 12'000;  // for a drawing of 150 kB
 
-/// White over yellow to dark red.
+/// From white over yellow to dark red.
 std::string heatColour(double share) {
   constexpr std::array<std::array<double, 3>, 4> kRamp = {
       {{247, 250, 252}, {252, 217, 118}, {227, 92, 51}, {102, 0, 38}}};

@@ -1,5 +1,5 @@
 #pragma once
-// Drawings as SVG: fields over a camera's image, and curves on logarithmic axes.
+// SVG drawings: fields over a camera's image, and curves on logarithmic axes.
 
 #include <Eigen/Core>
 #include <functional>
@@ -35,7 +35,7 @@ class ImageDrawing {
 
   void dots(const std::vector<Eigen::Vector2d>& pixels, const char* colour);
   void arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& along, const char* colour);
-  /// A value for each cell, coloured from 0 to `most`; NaN: none. A scale stands under the image.
+  /// A value per cell, coloured from 0 to `most`; NaN: none. A colour scale is drawn below the image.
   void heat(const ImageGrid& grid, const std::vector<double>& values, double most, const std::string& unit);
   void caption(const std::string& text);
   [[nodiscard]] std::string svg() const;
@@ -43,7 +43,7 @@ class ImageDrawing {
  private:
   int width_;
   int height_;
-  double line_;  // px that a line is wide
+  double line_;  // px, line width
   double below_ = 0;
   std::string under_;
   std::string over_;

@@ -10,11 +10,11 @@
 namespace swiftlet {
 namespace {
 
-// Normalized residuals of a right noise model are near 1; a factor of two is a wrong density, vibration or
-// misfit, and changes the sigmas by as much.
+// With a correct noise model, normalized residuals are near 1. A factor of two means a wrong density,
+// vibration or a bad fit, and changes the sigmas by as much.
 constexpr double kMostImuSigma = 2;
 constexpr double kLeastImuSigma = 0.5;
-// What a flight does not feel: docs/calibration.md.
+// Smaller sigmas do not affect a flight: docs/calibration.md.
 constexpr double kRotationSigma = 0.05;  // deg
 constexpr double kPositionSigma = 3;     // mm
 constexpr double kTimeSigma = 0.1;       // ms

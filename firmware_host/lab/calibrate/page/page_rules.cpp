@@ -6,7 +6,7 @@ namespace swiftlet {
 
 void PageRules::add(Rule rule) { rules_.push_back(std::move(rule)); }
 
-// NaN breaks a rule: what was not found is not good.
+// NaN breaks a rule: a value that was not found is not good.
 void PageRules::atMost(const std::string& what, const std::string& unit, double found, double limit,
                        const std::string& broken) {
   add({what, unit, fmt::format("at most {:.3g}", limit), found, found <= limit, broken});

@@ -1,5 +1,5 @@
 #pragma once
-// Rules that a calibration has to keep to be called good, as a table and as words.
+// Rules for calling a calibration good, as a table and as text.
 
 #include <string>
 #include <vector>
@@ -8,18 +8,18 @@
 
 namespace swiftlet {
 
-/// Part of the corners; mrcal's documentation calls more suspicious.
+/// Share of the corners; mrcal's documentation calls more suspicious.
 inline constexpr double kMostOutliers = 0.03;
 
 class PageRules {
  public:
-  /// `broken` is the sentence for the top of the page: what it means and what to do.
+  /// `broken`: sentence for the top of the page, saying what it means and what to do.
   void atMost(const std::string& what, const std::string& unit, double found, double limit,
               const std::string& broken);
   void atLeast(const std::string& what, const std::string& unit, double found, double limit,
                const std::string& broken);
 
-  /// Verdict, words and the table of rules; `reasons`: the solution's own.
+  /// Adds verdict, text and the table of rules; `reasons`: the solution's own.
   void finish(const std::vector<std::string>& reasons, CalibrationPage& page) const;
 
  private:

@@ -1,9 +1,9 @@
 #pragma once
 // The pages of the parts of `swiftlet calibrate`, with the rules for good, usable and repeat.
 //
-// Repeat: the solution gives reasons against it. Usable: a rule below is violated. Good: none is. The page's
-// table lists each rule with the value found. Limits about the image are angles, so they mean the same for
-// every lens.
+// Repeat: the solution gives reasons against it. Usable: a rule is violated. Good: no rule is violated. The
+// page's table lists each rule with the value found. Limits in the image are angles, so they mean the same
+// for every lens.
 
 #include <string>
 
@@ -16,7 +16,7 @@
 
 namespace swiftlet {
 
-/// `log`: for the title.
+/// `log`: used in the title.
 CalibrationPage cameraPage(const CameraSolution& solution, const CalibrationTarget& target,
                            const std::string& log);
 CalibrationPage imuCameraPage(const ImuCameraSolution& solution, const CalibrationTarget& target,
