@@ -17,12 +17,12 @@ struct AccuracyOptions {
 
 struct Accuracy {
   std::size_t estimates = 0;                 ///< poses in the section
-  std::size_t pairs = 0;                     ///< of them, with truth
-  Duration max_gap;                          ///< association: truth at most this far apart
+  std::size_t pairs = 0;                     ///< of these, with truth
+  Duration max_gap;                          ///< of the association: largest gap of the truth
   double duration = 0;                       ///< s from the first pair to the last
   TrajectoryError absolute;                  ///< ATE
   RelativeError over_time;                   ///< RPE
-  std::vector<RelativeError> over_distance;  ///< one for each of kSegmentLengths that has segments
+  std::vector<RelativeError> over_distance;  ///< for each of kSegmentLengths that has segments
 
   [[nodiscard]] double coverage() const {
     return estimates == 0 ? 0 : static_cast<double>(pairs) / static_cast<double>(estimates);

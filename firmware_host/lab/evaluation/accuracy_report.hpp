@@ -1,6 +1,6 @@
 #pragma once
-// Accuracy figures as JSON for summary.json and as lines for the terminal. Every number stands beside
-// the alignment, the association tolerance and the number of pairs it was made from.
+// Accuracy figures as JSON for summary.json and as lines for the terminal. Every number comes with its
+// alignment, association tolerance and number of pairs.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -16,13 +16,13 @@ namespace swiftlet {
 
 nlohmann::ordered_json toJson(const Accuracy& accuracy);
 nlohmann::ordered_json toJson(const Consistency& consistency);
-/// Of map.tum (the other) beside odometry.tum (the reference).
+/// Compares map.tum with odometry.tum, the reference.
 nlohmann::ordered_json toJson(const CommonStamps& map_beside_odometry);
 nlohmann::ordered_json toJson(const Revisits& revisits);
 nlohmann::ordered_json toJson(const LoopAccuracy& loops);
 nlohmann::ordered_json toJson(const PositionAccuracy& accuracy);
 
-/// `title`: which section and file, "odometry.tum, from 3 s".
+/// `title`: section and file, for example "odometry.tum, from 3 s".
 std::string toText(const std::string& title, const Accuracy& accuracy);
 std::string toText(const std::string& title, const PositionAccuracy& accuracy);
 std::string toText(const Consistency& consistency);

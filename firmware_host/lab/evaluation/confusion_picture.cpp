@@ -13,7 +13,7 @@
 namespace swiftlet {
 namespace {
 
-/// Rarer classes are not judged either (mean IoU).
+/// Rarer classes are not part of the mean IoU either.
 constexpr double kLeastShare = 0.01;
 constexpr int kCell = 56, kLeft = 150, kTop = 120, kMargin = 20;
 
@@ -102,7 +102,7 @@ std::string confusionSvg(const LabelConfusion& labels, const std::map<int, std::
       }
       others -= count;
       const double share = count / all;
-      // From white to a dark blue, or for what is wrong a dark red.
+      // From white to dark blue, or to dark red for errors.
       const auto tint = [share](int dark) { return static_cast<int>(255 - share * (255 - dark)); };
       const int x = kLeft + column * kCell, y = kTop + row * kCell;
       svg += fmt::format(

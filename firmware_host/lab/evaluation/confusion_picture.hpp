@@ -1,7 +1,7 @@
 #pragma once
-// The confusion matrix of a map's labels as a picture (SVG): a row for each true class that holds at least
-// kLeastShare of the places, a column for each of these found, one for every other label and one for none.
-// A cell's shade and number are the share of its row. Host side.
+// The confusion matrix of a map's labels as a picture (SVG). One row for each true class with at least
+// kLeastShare of the places; one column for each of these classes, one for all other labels and one for no
+// label. A cell's shade and number are its share of the row. Host side.
 
 #include <map>
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace swiftlet {
 
-/// Names by label, of a log's labels.csv (`#id,name`, then a line each). Empty if there is no such file;
-/// InputError with the line where one is not of that form.
+/// Names by label, from a log's labels.csv (`#id,name`, then one label per line). Empty if there is no such
+/// file; InputError naming the line if it is malformed.
 std::map<int, std::string> readLabelNames(const std::string& log);
 
 /// Labels without a name are shown by number.

@@ -28,7 +28,7 @@ std::vector<ConsistencyError> consistencyErrors(std::span<const ConsistencySampl
   const SE3& first_truth = samples.front().truth;
   const Eigen::Quaterniond turn = yawRotation(first_truth.R() * first.R().transpose());
   const SE3 T_truth_estimate(turn, first_truth.translation - turn * first.translation);
-  // The position block turns with the world axes.
+  // The position block rotates with the world axes.
   Matrix6d turned = Matrix6d::Identity();
   turned.bottomRightCorner<3, 3>() = turn.toRotationMatrix();
   errors.reserve(samples.size());

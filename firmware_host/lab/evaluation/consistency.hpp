@@ -1,11 +1,11 @@
 #pragma once
-// NEES: does the covariance say how large the error is?
+// NEES: whether the covariance matches the size of the error.
 //
-// Error state as everywhere: phi (body axes, R_truth = R_estimate Exp(phi)) and p (world axes). Position
-// and yaw are not observable, so both trajectories are taken relative to their first pair: the estimate
-// is moved by the yaw and translation that make the first poses agree. For a consistent estimate
-// e^T P^-1 e averages the number of its degrees of freedom: 6 for the pose, 3 for each half.
-// Source: Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 5.4.
+// Error state as everywhere: phi (body axes, R_truth = R_estimate Exp(phi)) and p (world axes). Position and
+// yaw are not observable, so both trajectories are taken relative to their first pair: the estimate is moved
+// by the yaw and translation that make the first poses agree. For a consistent estimate the mean of e^T P^-1
+// e is the number of degrees of freedom: 6 for the pose, 3 for each half. Source: Bar-Shalom, Li,
+// Kirubarajan, "Estimation with Applications to Tracking and Navigation", 5.4.
 
 #include <Eigen/Core>
 #include <span>
@@ -23,18 +23,18 @@ struct ConsistencySample {
   Matrix6d covariance = Matrix6d::Zero();  ///< of (phi, p)
 };
 
-/// One sample's error in the common gauge, with the covariance turned into it.
+/// Error of one sample in the common gauge, with the covariance transformed to that gauge.
 struct ConsistencyError {
   Eigen::Matrix<double, 6, 1> error = Eigen::Matrix<double, 6, 1>::Zero();  ///< (phi, p): rad, m
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// One for each sample; that of the first is zero in yaw and position, which fix the gauge.
+/// One error per sample; the first one fixes the gauge, so its yaw and position are zero.
 std::vector<ConsistencyError> consistencyErrors(std::span<const ConsistencySample> samples);
 
 struct Consistency {
   std::size_t count = 0;
-  std::size_t without_covariance = 0;  ///< left out: singular or not finite
+  std::size_t without_covariance = 0;  ///< omitted: singular or not finite
   double nees_pose = 0;                ///< mean; 6 = consistent
   double nees_rotation = 0;            ///< mean; 3
   double nees_position = 0;            ///< mean; 3

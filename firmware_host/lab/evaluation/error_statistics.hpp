@@ -17,7 +17,7 @@ struct ErrorStatistics {
   double sse = 0;
 };
 
-/// 0 of nothing.
+/// 0 if `whole` is 0.
 inline double shareOf(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }

@@ -38,7 +38,7 @@ Fit fitOf(const Trajectory& estimate, const Trajectory& truth, const AccuracyOpt
   return fit;
 }
 
-/// Empty where nobody knows the true surface.
+/// Path of the true surface; empty if unknown.
 std::string truthMesh(const MeshEvaluationRequest& request) {
   if (!request.truth_mesh.empty()) return request.truth_mesh;
   const fs::path path = fs::path(request.log) / "truth" / "mesh.ply";
@@ -114,7 +114,7 @@ class SequenceJudge {
 
   [[nodiscard]] TriangleMesh read(const std::string& path) const { return moved(readPly(path), *alignment_); }
 
-  /// One for all meshes of a kind, from the area that they have together.
+  /// Density for all meshes of a kind, from their total area.
   [[nodiscard]] double density(std::string MeshFrame::*file) const {
     double area = 0;
     for (const Judged& judged : judged_) {

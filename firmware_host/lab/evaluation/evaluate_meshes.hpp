@@ -1,5 +1,5 @@
 #pragma once
-// The meshes of a run folder against the true surface of its log.
+// Compares the meshes of a run folder with the true surface of its log.
 
 #include <string>
 
@@ -10,17 +10,17 @@ namespace swiftlet {
 
 struct MeshEvaluationRequest {
   std::string run;         ///< folder with meshes/frames.csv, complete_mesh.ply or local_mesh.ply
-  std::string log;         ///< says the cameras; its truth/ holds mesh.ply and observed.ply
-  std::string truth_mesh;  ///< in place of the log's truth/mesh.ply; observed.ply is looked for beside it
-  Trajectory in_map = {};  ///< of a run that was located in a kept map: map.ply lies in that one's frame
+  std::string log;         ///< gives the cameras; its truth/ holds mesh.ply and observed.ply
+  std::string truth_mesh;  ///< replaces the log's truth/mesh.ply; observed.ply is searched for beside it
+  Trajectory in_map = {};  ///< if the run was located in a kept map, in whose frame map.ply is
 };
 
-/// `estimate` is the run's trajectory, `truth` the log's; meshes are moved as the fit of the one onto the
-/// other says. Where the path is too short or straight for a fit of positions, by the pose in the middle;
-/// without a pair of poses they are judged where they are, and MeshAccuracy::alignment says so. Frames
-/// outside the section of `options` or without a true pose are left out. Without a true surface only the
-/// share of the hull that the meshes of a sequence draw is judged. InputError when there is nothing to judge
-/// or to judge by.
+/// `estimate`: the run's trajectory, `truth`: the log's. Meshes are moved by the alignment of the estimate to
+/// the truth. If the path is too short or straight to align positions, the pose in the middle is used;
+/// without a pair of poses the meshes are not moved, and MeshAccuracy::alignment says so. Frames outside the
+/// section of `options` or without a true pose are omitted. Without a true surface, only the share of the
+/// hull drawn by the meshes of a sequence is evaluated. InputError if there is nothing to evaluate or to
+/// compare with.
 MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajectory& estimate,
                             const Trajectory& truth, const AccuracyOptions& options);
 

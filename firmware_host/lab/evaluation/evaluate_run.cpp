@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// One file over all of the flight and from the common start.
+/// Accuracy of one file over the whole flight and from the common start.
 Json sectionsJson(const Trajectory& estimate, const Trajectory& truth, Stamp first_image,
                   const EvaluationGroup& settings) {
   Json json;
@@ -44,7 +44,7 @@ Truth readTruth(const std::string& path, bool without_images) {
   Truth truth;
   constexpr const char* kRemedy = "Give a trajectory file with --truth (TUM, or EuRoC csv)";
   if (isBag(path)) {
-    // Poses alone need no calibration, which a bag does not hold.
+    // Reading only poses needs no calibration, which a bag does not have.
     const auto bag = openBag(path);
     const auto topic = chooseTruthTopic(*bag);
     truth.poses = readBagTruth(*bag, topic, truth.warnings);
@@ -119,7 +119,7 @@ Json runAccuracyJson(const std::string& folder, const Trajectory& truth, const s
   json["truth"] = truth_name;
   const Trajectory odometry = readEstimate(path / "odometry.tum");
   json["odometry"] = sectionsJson(odometry, truth, first_image, settings);
-  // A run of a few frames has no keyframe that left the window with a state.
+  // A run of a few frames has no keyframe with a state that left the window.
   Trajectory states;
   try {
     states = readEstimate(path / "states.csv");

@@ -1,5 +1,5 @@
 #pragma once
-// The trajectories of a run folder, or of a single file, against the truth.
+// Compares the trajectories of a run folder, or of a single file, with the truth.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,44 +15,44 @@
 
 namespace swiftlet {
 
-/// Seconds after the first image from which every system is compared: all have started by then.
+/// Seconds after the first image from which all systems are compared: all have started by then.
 inline constexpr double kCommonStart = 3.0;
 
 AccuracyOptions accuracyOptions(const EvaluationGroup& settings, AlignKind align);
 
-/// A truth file's or a log's truth, in the estimator's body, on the IMU's clock. Everything below takes a
-/// truth on the images' clock (onImageClock), as a run's poses are.
+/// Truth from a truth file or a log, of the estimator's body and on the IMU's clock. The functions below take
+/// truth on the images' clock (onImageClock), like a run's poses.
 struct Truth {
   Trajectory poses;
   std::string name;
-  std::optional<Stamp> first_image;  ///< where a log says
-  LogWarnings warnings;              ///< what was left out of the poses
+  std::optional<Stamp> first_image;  ///< if given by a log
+  LogWarnings warnings;              ///< about poses that were omitted
 };
-/// `without_images`: a log is read as one of tracks, which need not hold images.
+/// `without_images`: the log is read as one of tracks, which may be without images.
 Truth readTruth(const std::string& path, bool without_images = false);
 
-/// Content of "accuracy" in summary.json: odometry.tum over all and from kCommonStart, SE(3) and yaw
-/// alignment; states.csv with its consistency; map.tum if it exists, alone and compared with odometry.tum at
-/// the same stamps; the share of the flight that revisits places.
+/// Content of "accuracy" in summary.json: odometry.tum over the whole flight and from kCommonStart, with
+/// SE(3) and yaw alignment; states.csv with its consistency; map.tum if it exists, alone and compared with
+/// odometry.tum at the same stamps; the share of the flight that revisits places.
 nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajectory& truth,
                                        const std::string& truth_name, Stamp first_image,
                                        const EvaluationGroup& settings);
 
-/// Of a loops.csv.
+/// Accuracy of the loops in a loops.csv.
 LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth, const EvaluationGroup& settings);
 
-/// Over the part of the truth that `estimate` (not empty) covers.
+/// Revisits over the part of the truth that `estimate` (not empty) covers.
 Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth);
 
-/// A trajectory file of any kind readTrajectory() takes; InputError when it has no pose. `warnings` receives
-/// what was left out.
+/// A trajectory file of any kind that readTrajectory() accepts; InputError if it has no pose. Omitted rows
+/// are reported in `warnings`.
 Trajectory readEstimate(const std::string& path, LogWarnings& warnings);
 Trajectory readEstimate(const std::string& path);
 
-/// How many rows were left out of `file`; the other warnings name the first of each kind.
+/// Warns how many rows of `file` were omitted; the other warnings name the first of each kind.
 void warnOfRows(const std::string& file, const LogCounters& counters, LogWarnings& warnings);
 
-/// NEES of a run's keyframes. Keyframes without truth are left out.
+/// NEES of a run's keyframes. Keyframes without truth are omitted.
 Consistency consistencyOf(const std::string& states_file, const Trajectory& truth, Duration max_gap);
 
 }  // namespace swiftlet

@@ -1,9 +1,9 @@
 #pragma once
-// Which labels a map has where: counts of (true label, found label), and the figures made of them.
+// Confusion of a map's labels: counts of (true label, found label), and figures derived from them.
 //
-// A place whose found label is 0 (none) counts against its true class: a map that says nothing is not right.
-// Places whose true label is 0 count nowhere. Intersection over union of class c: places of c found as c,
-// over places that are c or found as c (Everingham et al., IJCV 2010, section 4.3).
+// A place without a found label (0) counts against its true class. Places whose true label is 0 are not
+// counted. Intersection over union of class c: places of c found as c, divided by places that are c or were
+// found as c (Everingham et al., IJCV 2010, section 4.3).
 
 #include <array>
 #include <cstdint>
@@ -23,17 +23,17 @@ class LabelConfusion {
   [[nodiscard]] std::uint64_t count(std::uint8_t truth, std::uint8_t found) const {
     return counts_[index(truth, found)];
   }
-  /// With that true label.
+  /// Places with this true label.
   [[nodiscard]] std::uint64_t places(std::uint8_t truth) const;
-  /// With any true label.
+  /// Places with any true label.
   [[nodiscard]] std::uint64_t places() const;
-  /// Found right, of all with a true label; 0 without any.
+  /// Share of correctly found labels among places with a true label; 0 without any.
   [[nodiscard]] double accuracy() const;
-  /// 0 for a class that neither is nor was found.
+  /// 0 for a class that neither exists nor was found.
   [[nodiscard]] double intersectionOverUnion(std::uint8_t label) const;
-  /// Over the classes that hold at least `least_share` of the places.
+  /// Over the classes with at least `least_share` of the places.
   [[nodiscard]] double meanIntersectionOverUnion(double least_share) const;
-  /// True labels that occur, in their order.
+  /// True labels that occur, in ascending order.
   [[nodiscard]] std::vector<std::uint8_t> classes(double least_share = 0) const;
 
  private:

@@ -1,5 +1,6 @@
 #pragma once
-// Loops of a run against the truth: how many of those verified, and of those believed, show the same place.
+// Compares the loops of a run with the truth: how many of the verified and of the selected ones show the same
+// place.
 
 #include <cstddef>
 #include <span>
@@ -9,18 +10,18 @@
 
 namespace swiftlet {
 
-/// A loop further off than either of these is a false one.
+/// A loop that is off by more than either of these is false.
 inline constexpr double kFalseLoopDistance = 0.3;  // m
 inline constexpr double kFalseLoopDegrees = 6;
 
 struct LoopAccuracy {
-  std::size_t verified = 0;  ///< with truth at both ends
+  std::size_t verified = 0;  ///< verified loops with truth at both ends
   std::size_t verified_right = 0;
   std::size_t selected = 0;
   std::size_t selected_right = 0;
   std::size_t without_truth = 0;
-  double median_distance = 0;  ///< m, of the right ones
-  double median_degrees = 0;   ///< rotation, of the right ones
+  double median_distance = 0;  ///< m, of the correct loops
+  double median_degrees = 0;   ///< rotation, of the correct loops
 };
 
 LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth, Duration max_gap);

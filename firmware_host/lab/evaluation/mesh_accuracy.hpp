@@ -1,8 +1,8 @@
 #pragma once
-// Accuracy of a run's meshes: those of its frames, pooled, and that of the whole flight.
+// Accuracy of a run's meshes: of its frames, pooled, and of the whole flight.
 //
-// Pooled: all samples of all meshes at one density, so that every square metre of mesh weighs the same; all
-// seen pixels of all frames. Medians: over the meshes, each evaluated alone.
+// Pooled: all samples of all meshes at one density, so that every square metre of mesh has the same weight;
+// all seen pixels of all frames. Medians: over the meshes, each evaluated alone.
 
 #include <optional>
 #include <string>
@@ -16,25 +16,25 @@ namespace swiftlet {
 
 /// Step of the pixel grid for completeness [px]: 5640 rays for an image of 752 x 480.
 inline constexpr int kGridStep = 8;
-/// Samples of a sequence: where kSurfaceDensity would ask for more, all meshes are sampled more thinly.
+/// Most samples of a sequence: beyond it, all meshes are sampled with a lower density than kSurfaceDensity.
 inline constexpr double kMostSamples = 4e6;
 
 struct MeshSequenceAccuracy {
   std::size_t meshes = 0;
-  std::size_t empty = 0;  ///< of them, without area: they count for completeness alone
+  std::size_t empty = 0;  ///< of these, without area: they count only for completeness
   double density = 0;     ///< samples per m^2
   double area = 0;        ///< m^2, all meshes together
   DistanceStatistics distance;
-  double median_rmse = 0;  ///< m, over the meshes with area
+  double median_rmse = 0;  ///< m, over meshes with area
   Completeness completeness;
-  double median_completeness = 0;  ///< over the frames that saw surface in their hull
+  double median_completeness = 0;  ///< over frames that saw surface in their hull
   double median_hull_share = 0;    ///< of the image
   double label_share = 0;
   double unlabelled_share = 0;
 };
 
 /// Collects the meshes of a sequence, each in the true surface's axes, with what its frame saw. Without a
-/// true surface (null) only the coverage of the hull is evaluated.
+/// true surface (null), only the coverage of the hull is evaluated.
 class MeshSequence {
  public:
   MeshSequence(const TrueSurface* truth, double density) : truth_(truth), density_(density) {}
@@ -52,7 +52,7 @@ class MeshSequence {
   std::vector<double> hull_share_;
 };
 
-/// The density at which a sequence of `area` [m^2] is sampled.
+/// Sampling density for a sequence of `area` [m^2].
 double sequenceDensity(double area);
 
 struct CompleteMeshAccuracy {
@@ -65,16 +65,16 @@ struct CompleteMeshAccuracy {
   double label_share = 0;
   double unlabelled_share = 0;
   std::size_t observed = 0;  ///< observed points of the true surface; 0: unknown
-  std::size_t covered = 0;   ///< of them, with mesh within kCovered
-  LabelConfusion labels;     ///< of the samples
-  /// Of a map: the same once it lies on the true surface as well as it can.
+  std::size_t covered = 0;   ///< of these, with mesh within kCovered
+  LabelConfusion labels;     ///< labels of the samples
+  /// Of a map: the accuracy after registration to the true surface.
   std::optional<MeshRegistration> registration;
   DistanceStatistics registered;
 };
-/// Classes with a smaller share of the samples are left out of the mean over classes.
+/// Classes with a smaller share of the samples are not part of the mean over classes.
 inline constexpr double kLeastClassShare = 0.01;
 
-/// Adds to `accuracy` how far the mesh is from the truth after registration.
+/// Adds the distances of the mesh from the truth after registration to `accuracy`.
 void judgeRegistered(const TriangleMesh& mesh, const TriangleMesh& true_mesh, const TrueSurface& truth,
                      CompleteMeshAccuracy& accuracy);
 
@@ -85,9 +85,9 @@ CompleteMeshAccuracy completeMeshAccuracy(const TriangleMesh& mesh, const TrueSu
 struct MeshAccuracy {
   std::string truth;               ///< file of the true surface
   std::string alignment;           ///< how the run was moved onto the truth
-  std::size_t frames = 0;          ///< listed in the selected section
-  std::size_t without_truth = 0;   ///< of them, without a true pose: left out
-  std::size_t keyframes_bare = 0;  ///< of the rest, keyframes with no frame mesh
+  std::size_t frames = 0;          ///< in the selected section
+  std::size_t without_truth = 0;   ///< of these, without a true pose: omitted
+  std::size_t keyframes_bare = 0;  ///< of the rest, keyframes without a frame mesh
   std::optional<MeshSequenceAccuracy> frame;
   std::optional<MeshSequenceAccuracy> horizon;
   std::optional<CompleteMeshAccuracy> complete;

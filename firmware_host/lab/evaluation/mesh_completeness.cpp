@@ -9,9 +9,9 @@
 namespace swiftlet {
 namespace {
 
-/// Solid angle of a square of `size` pixels around `pixel`, by the lens model's derivative there.
+/// Solid angle of a square of `size` pixels around `pixel`, from the lens model's derivative.
 double solidAngle(const CameraModel& camera, const Eigen::Vector2d& pixel, double size) {
-  constexpr double kHalf = 0.5;  ///< px, of the difference quotient
+  constexpr double kHalf = 0.5;  ///< px, for the difference quotient
   Eigen::Vector3d left;
   Eigen::Vector3d right;
   Eigen::Vector3d above;
@@ -23,7 +23,7 @@ double solidAngle(const CameraModel& camera, const Eigen::Vector2d& pixel, doubl
   return known ? (right - left).cross(below - above).norm() * size * size : 0;
 }
 
-/// By the number of edges that a line to the right crosses.
+/// Whether the pixel is inside, by the number of edges that a line to the right crosses.
 bool inside(std::span<const Eigen::Vector2f> polygon, const Eigen::Vector2d& pixel) {
   bool odd = false;
   for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {

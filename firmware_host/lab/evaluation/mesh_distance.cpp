@@ -8,20 +8,20 @@
 namespace swiftlet {
 namespace {
 
-constexpr std::uint32_t kLeaf = 4;  ///< triangles; fewer are not split further
+constexpr std::uint32_t kLeaf = 4;  ///< triangles; smaller nodes are not split
 constexpr std::size_t kBins = 16;
-// From here on a span is halved: at most 32 halvings of 2^32 triangles follow.
+// From this depth on a span is halved: at most 32 more halvings, for up to 2^32 triangles.
 constexpr int kHalvingDepth = 24;
 constexpr std::size_t kStack = kHalvingDepth + 32 + 2;
 constexpr double kEdge = 1e-9;    ///< widening of a triangle for rays, in barycentric coordinates
-constexpr double kTiny = 1e-300;  ///< stands in for zero in a direction, so that no product is NaN
+constexpr double kTiny = 1e-300;  ///< replaces zero in a direction, so that no product is NaN
 
 struct Waiting {
   std::uint32_t node;
-  double bound;  ///< no triangle below is nearer
+  double bound;  ///< lower bound of the distance to the triangles below
 };
 
-/// Nodes still to be visited, nearest on top.
+/// Nodes still to be visited; the nearest is on top.
 class Stack {
  public:
   void push(std::uint32_t node, double bound) { waiting_[size_++] = {node, bound}; }
@@ -123,7 +123,7 @@ std::uint32_t MeshDistance::split(std::vector<Item>& items, const Span& span, co
     box[bin_of(*item)].add(item->box);
     ++count[bin_of(*item)];
   }
-  // cost_above[k]: of the bins from k on; then the sweep from below finds the cheapest border.
+  // cost_above[k]: cost of the bins from k on. The sweep from below then finds the cheapest split.
   std::array<double, kBins> cost_above{};
   Box swept;
   std::uint32_t number = 0;
@@ -175,7 +175,7 @@ double MeshDistance::nearestOf(const Triangle& triangle, const Eigen::Vector3d& 
     return (bp - w * (ac - ab)).squaredNorm();
   }
   const double sum = va + vb + vc;
-  // A sliver whose inside rounding has lost.
+  // A sliver whose area is lost to rounding.
   if (!(sum > 0)) return std::min({ap.squaredNorm(), bp.squaredNorm(), cp.squaredNorm()});
   return (ap - vb / sum * ab - vc / sum * ac).squaredNorm();
 }
@@ -193,7 +193,7 @@ std::optional<MeshDistance::Answer> MeshDistance::nearest(const Eigen::Vector3d&
     const Node& node = nodes_[next.node];
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
       const double squared = nearestOf(triangles_[i], p);
-      // Written so that a distance of exactly `most` counts and the first of equals stays.
+      // A distance of exactly `most` counts, and of equal ones the first is kept.
       if (!(any ? squared < best : squared <= best)) continue;
       any = true;
       best = squared;
@@ -217,13 +217,13 @@ std::optional<MeshDistance::Answer> MeshDistance::cast(const Eigen::Vector3d& or
   for (int k = 0; k < 3; ++k) {
     inverse[k] = 1.0 / (std::abs(direction[k]) < kTiny ? kTiny : direction[k]);
   }
-  // Where the ray enters a box; beyond `most` when it misses it.
+  // Distance at which the ray enters a box; larger than `most` if it misses the box.
   const auto entry = [&](const Box& box) {
     const Eigen::Array3d a = (box.low - origin.array()) * inverse;
     const Eigen::Array3d b = (box.high - origin.array()) * inverse;
     const double in = std::max(a.min(b).maxCoeff(), 0.0);
     const double out = a.max(b).minCoeff();
-    // A flat box may lose its ray to rounding.
+    // Tolerance, because rounding may lose the ray in a flat box.
     return in <= out * (1 + kEdge) + kEdge ? in : kAnyDistance;
   };
   double best = most;

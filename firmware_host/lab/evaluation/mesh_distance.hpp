@@ -1,12 +1,11 @@
 #pragma once
 // Distance from points, and along rays, to the triangles of a mesh.
 //
-// A bounding volume hierarchy: binned surface area splits (Wald, "On fast Construction of SAH-based
+// A bounding volume hierarchy: splits by binned surface area (Wald, "On fast Construction of SAH-based
 // Bounding Volume Hierarchies", RT 2007) and, below a fixed depth, halves, so that a query's stack has a
-// fixed size. Nearest point of a triangle: Ericson, "Real-Time Collision Detection", 5.1.5. Rays:
-// Moeller, Trumbore, 1997, both sides, edges widened by 1e-9 of the triangle so that no ray slips
-// between neighbours.
-// Double precision. Building: O(n log n), 180 bytes a triangle; a query visits O(log n) nodes.
+// fixed size. Nearest point of a triangle: Ericson, "Real-Time Collision Detection", 5.1.5. Rays: Moeller,
+// Trumbore, 1997, both sides, with edges widened by 1e-9 of the triangle so that no ray passes between
+// neighbours. Double precision. Building: O(n log n), 180 bytes per triangle; a query visits O(log n) nodes.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -24,20 +23,20 @@ class MeshDistance {
 
   struct Answer {
     double distance = 0;     ///< m; along the ray for cast()
-    std::uint32_t face = 0;  ///< of the mesh given
+    std::uint32_t face = 0;  ///< index in the given mesh
   };
 
   /// Keeps a copy of the triangles.
   explicit MeshDistance(const TriangleMesh& mesh);
 
-  /// The triangle nearest to `p`; empty when none lies within `most` (or the mesh has none).
+  /// The triangle nearest to `p`; empty if none is within `most` (or the mesh has none).
   [[nodiscard]] std::optional<Answer> nearest(const Eigen::Vector3d& p, double most = kAnyDistance) const;
 
   /// The first triangle along the ray; `direction` has unit length.
   [[nodiscard]] std::optional<Answer> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                            double most = kAnyDistance) const;
 
-  /// Unit normal of a face by its corners' order; zero for one without area.
+  /// Unit normal of a face, by the order of its corners; zero for a face without area.
   [[nodiscard]] Eigen::Vector3d normal(std::uint32_t face) const;
 
  private:
@@ -57,7 +56,7 @@ class MeshDistance {
     [[nodiscard]] double halfArea() const;
     [[nodiscard]] double squaredDistance(const Eigen::Array3d& p) const;
   };
-  /// Children stand side by side behind their parent; a leaf has `count` triangles from `first`.
+  /// Children are adjacent and follow their parent; a leaf has `count` triangles from `first`.
   struct Node {
     Box box;
     std::uint32_t first = 0;
@@ -81,8 +80,8 @@ class MeshDistance {
 
   std::vector<Node> nodes_;
   std::vector<Triangle> triangles_;   ///< in the order of the leaves
-  std::vector<std::uint32_t> faces_;  ///< which face of the mesh each is
-  std::vector<std::uint32_t> place_;  ///< where each face of the mesh is among them
+  std::vector<std::uint32_t> faces_;  ///< index in the mesh of each triangle
+  std::vector<std::uint32_t> place_;  ///< index in triangles_ of each face of the mesh
 };
 
 }  // namespace swiftlet

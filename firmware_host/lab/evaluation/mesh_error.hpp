@@ -1,11 +1,11 @@
 #pragma once
-// How far a mesh lies from the true surface, and whether it carries the true labels.
+// Distance of a mesh from the true surface, and correctness of its labels.
 //
-// The mesh is sampled evenly by area: along the running sum of the faces' areas at equal steps, and
-// within the faces by the R2 sequence (Roberts 2018, a two-dimensional golden ratio), so the points of
-// one mesh are always the same. The error of a point is its distance to the nearest true triangle; its
-// label is right when that triangle has the label of the point's face. Faces with label 0 are counted
-// apart. Cost: about 1 us a point.
+// The mesh is sampled evenly by area: at equal steps along the running sum of the faces' areas, and within
+// the faces by the R2 sequence (Roberts 2018, a two-dimensional golden ratio), so the points of one mesh are
+// always the same. The error of a point is its distance to the nearest true triangle. Its label is right if
+// that triangle has the label of the point's face. Faces with label 0 are counted separately. Cost: about 1
+// us per point.
 
 #include <cstdint>
 #include <vector>
@@ -16,7 +16,7 @@
 
 namespace swiftlet {
 
-/// Points per square metre at which a surface is judged.
+/// Sampling density [points per square metre].
 inline constexpr double kSurfaceDensity = 1000;
 
 struct SurfaceSample {
@@ -26,7 +26,7 @@ struct SurfaceSample {
 
 double areaOf(const TriangleMesh& mesh);
 
-/// round(area * density) points, at least one where there is area.
+/// round(area * density) points, at least one if there is area.
 std::vector<SurfaceSample> sampleSurface(const TriangleMesh& mesh, double density);
 
 /// The mesh moved (and scaled) by an alignment.
@@ -37,7 +37,7 @@ class TrueSurface {
  public:
   explicit TrueSurface(const TriangleMesh& mesh) : distance_(mesh), labels_(mesh.labels) {}
   [[nodiscard]] const MeshDistance& distance() const { return distance_; }
-  /// 0 where the file has none.
+  /// 0 if the file has no labels.
   [[nodiscard]] std::uint8_t label(std::uint32_t face) const { return labels_.empty() ? 0 : labels_[face]; }
 
  private:
@@ -55,19 +55,19 @@ struct DistanceStatistics {
 /// All zero for an empty list.
 DistanceStatistics statisticsOf(std::vector<float> distances);
 
-/// Of one mesh, or of several sampled at one density.
+/// Of one mesh, or of several sampled at the same density.
 struct SurfaceError {
   double area = 0;               ///< m^2
-  std::vector<float> distances;  ///< m, one a sample
+  std::vector<float> distances;  ///< m, one per sample
   std::size_t labelled = 0;      ///< samples on faces with a label
-  std::size_t label_right = 0;   ///< of them
+  std::size_t label_right = 0;   ///< of these, with the right label
 
   void add(const SurfaceError& other);
-  [[nodiscard]] double labelShare() const;       ///< right among the labelled; 0 without any
-  [[nodiscard]] double unlabelledShare() const;  ///< of all samples
+  [[nodiscard]] double labelShare() const;       ///< right labels among labelled samples; 0 without any
+  [[nodiscard]] double unlabelledShare() const;  ///< unlabelled share of all samples
 };
 
-/// `mesh` in the true surface's axes. `labels`, when given, gets the samples' labels beside the true ones.
+/// `mesh` in the true surface's axes. `labels`, if given, receives the samples' found and true labels.
 SurfaceError surfaceError(const TriangleMesh& mesh, const TrueSurface& truth, double density,
                           LabelConfusion* labels = nullptr);
 

@@ -11,9 +11,9 @@ namespace swiftlet {
 namespace {
 
 constexpr const char* kRemedy = "Write the meshes again";
-constexpr std::size_t kColumns = 5;  ///< the hull, the sixth, may be missing
+constexpr std::size_t kColumns = 5;  ///< the sixth, the hull, may be missing
 
-/// False on text and on an odd count.
+/// False for text and for an odd number of values.
 bool readHull(std::string_view text, std::vector<Eigen::Vector2f>& hull) {
   std::vector<double> numbers;
   while (true) {

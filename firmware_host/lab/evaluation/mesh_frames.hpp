@@ -23,7 +23,7 @@ struct MeshFrame {
   std::vector<Eigen::Vector2f> hull;
 };
 
-/// InputError with the line on the first bad row: the file is a program's own.
+/// InputError naming the line of the first bad row, because the file is written by a program.
 std::vector<MeshFrame> readMeshFrames(const std::string& folder);
 
 }  // namespace swiftlet

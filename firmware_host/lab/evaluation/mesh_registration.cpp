@@ -12,7 +12,7 @@ namespace {
 constexpr double kSamples = 20'000;
 constexpr std::size_t kLeastPairs = 100;
 constexpr int kMostIterations = 50;
-// A residual beyond this weighs less: an edge of the truth that the mesh rounds off [m].
+// Larger residuals are down-weighted: edges of the truth that the mesh rounds off [m].
 constexpr double kHuber = 0.02;
 constexpr double kSettled = 1e-4;  // m, rad
 
@@ -24,7 +24,7 @@ struct NormalEquations {
   Vector6d b = Vector6d::Zero();
   std::size_t pairs = 0;
 
-  /// The plane through `on` with `normal`; motion about the origin, rotation first.
+  /// Adds the plane through `on` with `normal`; motion about the origin, rotation first.
   void add(const Eigen::Vector3d& point, const Eigen::Vector3d& on, const Eigen::Vector3d& normal) {
     const double residual = normal.dot(point - on);
     const double weight = std::abs(residual) <= kHuber ? 1 : kHuber / std::abs(residual);
@@ -59,7 +59,7 @@ MeshRegistration registerMesh(const TriangleMesh& mesh, const TriangleMesh& trut
       motion = SE3();
       return result;
     }
-    // What the surface does not hold (one plane alone) stays where it is.
+    // Directions that the surface does not determine (one plane alone) are not moved.
     const Matrix6d damping = 1e-6 * equations.H.diagonal().maxCoeff() * Matrix6d::Identity();
     const Vector6d step = (equations.H + damping).ldlt().solve(equations.b);
     SE3 turn;

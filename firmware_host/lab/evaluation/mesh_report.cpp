@@ -74,7 +74,7 @@ std::string distanceText(const DistanceStatistics& s) {
   return fmt::format("{:9.4f}{:9.4f}{:9.4f}{:9.4f}", s.mean, s.rmse, s.median, s.percentile95);
 }
 
-/// "-" where no face had a label.
+/// "-" if no face has a label.
 std::string labelText(double right, double unlabelled, std::size_t samples) {
   const bool labelled = samples > 0 && unlabelled < 1;
   return fmt::format("{:>8}{:>12}", labelled ? fmt::format("{:.1f} %", 100 * right) : "-",

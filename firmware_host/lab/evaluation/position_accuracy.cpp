@@ -7,7 +7,8 @@
 namespace swiftlet {
 namespace {
 
-/// Of the estimate: a straight line over it is off by 5 cm at 10 m/s^2, less than such truths are.
+/// Longest gap of the estimate: at 10 m/s^2 a straight line across it is off by 5 cm, less than such truths
+/// are.
 constexpr Duration kLongestGap = Duration::fromMilliseconds(200);
 
 std::vector<PosePair> pairsOf(const Trajectory& estimate, std::span<const PositionPoint> truth,
@@ -22,11 +23,11 @@ std::vector<PosePair> pairsOf(const Trajectory& estimate, std::span<const Positi
   return pairs;
 }
 
-/// The shift with the least RMSE of those that keep most of the pairs that any has.
+/// The shift with the smallest RMSE among those that keep most of the pairs.
 Duration fittedShift(const Trajectory& estimate, std::span<const PositionPoint> truth,
                      const PositionAccuracyOptions& options) {
-  constexpr double kStep = 0.1;     // s; a vehicle at 10 m/s flies a metre in it
-  constexpr double kKept = 0.8;     // of the most pairs
+  constexpr double kStep = 0.1;     // s; a vehicle at 10 m/s flies one metre in it
+  constexpr double kKept = 0.8;     // of the largest number of pairs
   constexpr double kFinest = 1e-3;  // s
   const AssociationOptions& association = options.accuracy.association;
   const auto rmse = [&](double shift, std::size_t least) {

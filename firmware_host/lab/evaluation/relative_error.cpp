@@ -15,7 +15,7 @@ RelativeError overIntervals(std::span<const PosePair> pairs, const std::vector<d
   result.interval = interval;
   std::vector<double> translation;
   std::vector<double> rotation;
-  // Sums of many steps reach an interval a rounding error late.
+  // Sums of many steps reach an interval with a rounding error.
   const double slack = 1e-9 * interval;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const auto found = std::ranges::lower_bound(position, position[i] + interval - slack);

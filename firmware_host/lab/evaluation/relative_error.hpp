@@ -1,13 +1,13 @@
 #pragma once
-// Relative pose error (RPE): how far the motion over an interval is off, without any alignment.
+// Relative pose error (RPE): error of the motion over an interval, without any alignment.
 //
 //   E = (T_truth_i^-1 T_truth_j)^-1 (T_estimate_i^-1 T_estimate_j)
 //
-// Over time: j is the first pair at least `delta` after i; errors in m and degrees per interval.
-// Over distance: j is the first pair at which the truth has flown `length` since i; errors as a
-// percentage of the length and in degrees per metre, as the KITTI and OpenVINS tables have them.
-// Every pair is a start. A pair is not used when j overshoots by more than half the interval (a gap).
-// Sources: Sturm et al., IROS 2012; Geiger et al., CVPR 2012; Zhang, Scaramuzza, IROS 2018.
+// Over time: j is the first pair at least `delta` after i; errors in m and degrees per interval. Over
+// distance: j is the first pair at which the truth has flown `length` since i; errors as a percentage of the
+// length and in degrees per metre, as in the KITTI and OpenVINS tables. Every pair is a start. A pair is not
+// used if j overshoots by more than half the interval (a gap). Sources: Sturm et al., IROS 2012; Geiger et
+// al., CVPR 2012; Zhang, Scaramuzza, IROS 2018.
 
 #include <span>
 #include <vector>
@@ -27,7 +27,7 @@ RelativeError relativeErrorOverTime(std::span<const PosePair> pairs, Duration de
 
 RelativeError relativeErrorOverDistance(std::span<const PosePair> pairs, double length);
 
-/// OpenVINS' segment lengths [m]; those longer than the flight give a count of zero.
+/// OpenVINS' segment lengths [m]; those longer than the flight have a count of zero.
 inline constexpr double kSegmentLengths[] = {8, 16, 24, 32, 40};
 
 }  // namespace swiftlet

@@ -1,8 +1,9 @@
 #pragma once
-// How much of a flight comes back to where it was: what loop closure has to work on.
+// Measures how much of a flight returns to earlier places, where loop closure can work.
 //
-// The truth is sampled every `spacing`. A sample revisits when an earlier one, more than `min_apart` before,
-// was within `max_distance` and `max_turn` of it. Cost quadratic in the samples: a millisecond for 90 s.
+// The truth is sampled every `spacing`. A sample is a revisit if an earlier one, more than `min_apart`
+// before, was within `max_distance` and `max_turn` of it. Cost quadratic in the samples: a millisecond for 90
+// s.
 
 #include "drivers/recorded/trajectory_file.hpp"
 
@@ -17,7 +18,7 @@ struct RevisitOptions {
 
 struct Revisits {
   std::size_t samples = 0;
-  std::size_t revisiting = 0;  ///< samples that have an older one near
+  std::size_t revisiting = 0;  ///< samples with an earlier one nearby
   std::size_t pairs = 0;
 };
 
