@@ -14,7 +14,7 @@ namespace swiftlet {
 namespace {
 
 constexpr float kFullColour = 255;
-constexpr std::uint8_t kMiddleGrey = 128;  // of vertices that no image has seen
+constexpr std::uint8_t kMiddleGrey = 128;  // for vertices not seen by any image
 
 template <typename Point>
 void set(Point& to, const Eigen::Vector3d& from) {
@@ -42,7 +42,7 @@ rosmsg::ColorRGBA colourOf(std::uint8_t red, std::uint8_t green, std::uint8_t bl
 
 using Colour = std::array<std::uint8_t, 3>;
 
-/// The label's colour; of what has none its grey value.
+/// The label's colour; the grey value if there is no label.
 Colour surfaceColour(const TriangleMesh& mesh, std::uint32_t vertex, std::uint8_t label) {
   if (label != 0) return labelColour(label);
   const std::uint8_t grey = mesh.grey.empty() ? kMiddleGrey : mesh.grey[vertex];
@@ -55,7 +55,7 @@ std::uint8_t levelOf(const std::string& health) {
                                                : rosmsg::DiagnosticStatus::kWarn;
 }
 
-/// `name` as rqt_robot_monitor groups it: what stands before the slash is one tree.
+/// `name` as grouped by rqt_robot_monitor: the part before the slash is one tree.
 rosmsg::DiagnosticStatus statusOf(const char* name, std::uint8_t level, const std::string& message) {
   rosmsg::DiagnosticStatus status;
   status.name = name;

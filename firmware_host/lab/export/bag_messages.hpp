@@ -1,5 +1,5 @@
 #pragma once
-// Our estimate as messages of ROS, 1 or 2.
+// The estimate as messages of ROS 1 or 2.
 
 #include <string>
 
@@ -18,20 +18,20 @@ rosmsg::Odometry bagOdometry(const NavState& state, const RosFrames& frames);
 /// The header has the stamp of the first pose, from which on the path is shown.
 rosmsg::Path bagPath(const std::string& frame, const Trajectory& trajectory);
 rosmsg::Vector3Stamped bagVector(Stamp stamp, const std::string& frame, const Eigen::Vector3d& vector);
-/// Three points and colours a face: the label's colour, or the corners' grey values. A mesh without faces
-/// takes the marker away.
+/// Three points and colours per face: the label's colour, or the corners' grey values. A mesh without faces
+/// removes the marker.
 rosmsg::Marker bagMarker(Stamp stamp, const std::string& frame, const std::string& name,
                          const TriangleMesh& mesh);
-/// The mesh's vertices: x y z [m], rgb (0x00RRGGBB in a float's bits, as viewers look for it) and label, as
-/// docs/ros2.md has them. A vertex has the label of the first labelled face that it is a corner of.
+/// The mesh's vertices: x y z [m], rgb (0x00RRGGBB in the bits of a float, as expected by viewers) and label,
+/// as in docs/ros2.md. A vertex has the label of its first labelled face.
 rosmsg::PointCloud2 bagPoints(Stamp stamp, const std::string& frame, const TriangleMesh& mesh);
-/// Standard deviations of three variances in a row on the diagonal of the state's covariance, from `first`
-/// on.
+/// Standard deviations from three consecutive diagonal elements of the state's covariance, starting at
+/// `first`.
 Eigen::Vector3d bagSigma(const NavState& state, int first);
 /// 0: good; 1: initializing or degraded; 2: failed.
 rosmsg::Float64 bagLevel(Health health);
 rosmsg::DiagnosticArray bagDiagnostics(const KeyframeState& keyframe);
-/// The event, and the health as it then is.
+/// The event, and the health after it.
 rosmsg::DiagnosticArray bagDiagnostics(const EventLine& event, const std::string& health);
 
 }  // namespace swiftlet

@@ -74,7 +74,7 @@ std::vector<rosmsg::TransformStamped> LogBag::cameraTransforms(Stamp stamp) cons
 void LogBag::writeSample(const ImuSample& sample) {
   check(sample.stamp);
   if (options_.transforms && !fixed_) {
-    // Once, with the first sample's stamp: they hold for all of the log.
+    // Written once, with the first sample's stamp, for the whole log.
     fixed_ = true;
     bag_.write("/tf_static", sample.stamp, rosmsg::TFMessage{cameraTransforms(sample.stamp)}, true);
   }
@@ -100,7 +100,7 @@ void LogBag::writeImage(const CameraFrame& frame) {
     writePicture(bag_, frame.camera, frame.stamp, picture, info);
     return;
   }
-  // A log's images have no padding behind their rows.
+  // A log's images have no padding at the end of rows.
   const std::size_t bytes = static_cast<std::size_t>(info.width) * info.height;
   writePixels(bag_, frame.camera, frame.stamp, {frame.image.data, bytes}, info);
 }

@@ -1,10 +1,9 @@
 #pragma once
-// The messages of a log in a bag: what cameras and IMU sent, the calibration as CameraInfo and transforms,
-// the truth. docs/export.md lists the topics.
+// Writes the messages of a log to a bag: images, samples, the calibration as CameraInfo and transforms, the
+// truth. docs/export.md lists the topics.
 //
-// Images are the log's own files (CompressedImage) where it has files, pixels otherwise; or JPEG throughout.
-// Samples are those of the sensor: a log that is turned into body axes is turned back. Memory: the truth, and
-// an image.
+// Images are the log's own files (CompressedImage) if it has files, otherwise pixels; or all as JPEG. Samples
+// are in the sensor's axes: rotation to body axes is undone. Memory: the truth, and one image.
 
 #include <array>
 #include <cstddef>
@@ -18,20 +17,20 @@ namespace swiftlet {
 
 struct LogBagOptions {
   RosFrames frames;
-  bool raw_images = false;  ///< pixels, also where the log has files
-  int jpeg_quality = 0;     ///< 1 to 100: all images encoded as JPEG, in place of files and pixels; 0: not
+  bool raw_images = false;  ///< write pixels even if the log has files
+  int jpeg_quality = 0;     ///< 1 to 100: all images as JPEG instead of files or pixels; 0: off
   bool truth = true;
-  bool transforms = true;  ///< from the body to the cameras; a run's bag has its own message of fixed ones
+  bool transforms = true;  ///< from the body to the cameras; a run's bag writes its own static transforms
 };
 
 class LogBag {
  public:
   LogBag(LogSource& log, const LogBagOptions& options, MessageBag& bag);
 
-  /// All messages up to this stamp.
+  /// Writes all messages up to this stamp.
   void writeUntil(Stamp stamp);
   void writeRest();
-  /// From the body to each camera.
+  /// Transforms from the body to each camera.
   [[nodiscard]] std::vector<rosmsg::TransformStamped> cameraTransforms(Stamp stamp) const;
 
  private:
@@ -49,8 +48,8 @@ class LogBag {
   Trajectory truth_;
   std::size_t next_truth_ = 0;
   SensorMessage message_;
-  bool pending_ = false;  ///< message_ is not written yet
-  bool fixed_ = false;    ///< transforms are written
+  bool pending_ = false;  ///< message_ has been read but not written
+  bool fixed_ = false;    ///< transforms have been written
 };
 
 }  // namespace swiftlet

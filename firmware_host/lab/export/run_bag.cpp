@@ -16,21 +16,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A record's size is a u32 and viewers hold a marker several times over: 120 bytes a face.
+// A record's size is 32 bits and viewers hold a marker several times: 120 bytes per face.
 constexpr std::size_t kMostFaces = 4'000'000;
 
-// Where the error states begin, as the order in nav_state.hpp has it.
+// First indices of error states, in the order of nav_state.hpp.
 constexpr int kAttitude = 0;
 constexpr int kPosition = 3;
 constexpr int kVelocity = 6;
 
-/// Gathers what is to be written, then writes it in the order of the stamps.
+/// Collects the messages, then writes them in the order of their stamps.
 class RunBag {
  public:
   RunBag(const RunFolder& run, const BagTruth& truth, const RunBagOptions& options, MessageBag& bag)
       : run_(run), truth_(truth), frames_(options.frames), meshes_(options.meshes), bag_(bag) {}
 
-  /// `log`: its messages go between those of the run; null: none.
+  /// `log`: its messages are merged with those of the run; null: none.
   void write(LogBag* log) {
     log_ = log;
     plan();
@@ -57,7 +57,7 @@ class RunBag {
     if (meshes_) planMeshes();
   }
 
-  /// `make` gives the message when its turn has come.
+  /// `make` creates the message when it is written.
   template <typename Make>
   void at(Stamp stamp, const std::string& where, const std::string& topic, Make make, bool latched = false) {
     if (!bag_.holds(stamp)) {
@@ -72,7 +72,7 @@ class RunBag {
   void planTransforms() {
     const std::string where = pathOf(run_.odometry_file);
     const Stamp first = run_.odometry.front().stamp;
-    // One message: a player repeats only the last of a topic.
+    // A single message, because a player repeats only the last of a topic.
     if (run_.map.empty() || !truth_.poses.empty() || log_ != nullptr) {
       at(
           first, where, "/tf_static",
@@ -121,7 +121,7 @@ class RunBag {
     }
   }
 
-  /// What viewers plot: a number a field, without a formula.
+  /// Values for plotting, one number per field, so that viewers need no formulas.
   void planFigures(const KeyframeState& keyframe, const std::string& where) {
     const NavState& state = keyframe.state;
     const auto vector = [&](const char* topic, const std::string& frame, const Eigen::Vector3d& value) {
@@ -176,7 +176,7 @@ class RunBag {
     }
   }
 
-  /// All of it at its beginning: what grows with every pose would fill the bag with itself.
+  /// The whole path at its beginning: a path that grows with every pose would fill the bag.
   void planPath(const std::string& topic, const std::string& frame, const Trajectory& trajectory,
                 const std::string& where) {
     if (trajectory.empty()) return;
@@ -193,7 +193,7 @@ class RunBag {
        [&frame, stamp, mesh_file, name] { return bagMarker(stamp, frame, name, readMesh(mesh_file)); });
   }
 
-  /// The same surface for viewers that know no triangles.
+  /// The same surface as points, for viewers without triangles.
   void planPoints(const std::string& topic, const std::string& frame, Stamp stamp,
                   const std::string& mesh_file, const std::string& where) {
     if (mesh_file.empty()) return;

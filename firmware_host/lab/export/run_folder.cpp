@@ -32,7 +32,7 @@ void requireFile(const fs::path& path) {
                    "Give the whole run folder, or replay the log again");
 }
 
-/// Which log the run was made from; a run that ended badly has no summary.
+/// Finds the log of the run; a run that ended badly has no summary.
 void readSummary(const fs::path& path, RunFolder& run) {
   if (!fs::exists(path)) return;
   std::ifstream file(path);

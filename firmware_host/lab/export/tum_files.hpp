@@ -8,10 +8,10 @@
 
 namespace swiftlet {
 
-/// Writes into `folder`, which is made: the run's own TUM files byte for byte (odometry.tum or
-/// trajectory.tum, map.tum, imu_rate.tum), keyframes.tum from states.csv, truth.tum from `truth` (none where
-/// it is empty). Files of these names that the run has no part for are removed once all are written. Gives
-/// the names written. InputError where a file cannot be written, and for a folder that is a run.
+/// Writes into `folder`, which is created: the run's own TUM files byte for byte (odometry.tum or
+/// trajectory.tum, map.tum, imu_rate.tum), keyframes.tum from states.csv, truth.tum from `truth` (none if it
+/// is empty). Existing files of these names that the run does not provide are removed after all are written.
+/// Returns the names written. InputError if a file cannot be written, and for a folder that is a run.
 std::vector<std::string> writeTumFiles(const RunFolder& run, const Trajectory& truth,
                                        const std::string& folder);
 
