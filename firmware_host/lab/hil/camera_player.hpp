@@ -1,10 +1,10 @@
 #pragma once
-// Shows a log's images on a camera of the kernel's vivid driver, through its output node, and breaks the
-// camera when told to.
+// Shows a log's images on a camera of the kernel's vivid driver, through its output node, and simulates
+// faults of the camera.
 //
 // The driver takes the next image from its output's queue at each of its instants (whole periods of
-// CLOCK_MONOTONIC): an image that waits there is seen exactly once, one that comes late not until the next
-// instant, with the one before seen twice. So two images are kept waiting.
+// CLOCK_MONOTONIC). An image that waits at that time is seen exactly once; a late image is not seen until the
+// next instant, and the previous one is seen twice. So two images are kept waiting.
 
 #include <cstdint>
 #include <string>
@@ -18,10 +18,10 @@ namespace swiftlet {
 
 class CameraPlayer {
  public:
-  /// Images that wait to be seen, at the most.
+  /// Most images waiting to be seen.
   static constexpr std::size_t kAhead = 2;
 
-  /// `output`: the node to write to; `capture`: the node that shows it, whose driver's switches break it.
+  /// `output`: the node to write to; `capture`: the node that shows it and whose controls simulate faults.
   DeviceFault open(const std::string& output, const std::string& capture, int width, int height);
 
   void close() { output_.close(); }
@@ -31,16 +31,16 @@ class CameraPlayer {
   /// Images written and not yet seen.
   [[nodiscard]] std::size_t waiting() const { return output_.queued(); }
   DeviceFault show(const ImageView& image) { return output_.write(image); }
-  /// All of it `grey`.
+  /// Shows an image of uniform `grey`.
   DeviceFault showDark(int grey);
 
-  /// The driver's "Disconnect": readers get ENODEV, and the node returns when they have closed it.
+  /// The driver's "Disconnect": readers get ENODEV, and the node returns after they have closed it.
   DeviceFault unplug();
-  /// The driver's "Percentage of Dropped Buffers", all or none. Its output also stops: waiting images are old
-  /// when it continues.
+  /// The driver's "Percentage of Dropped Buffers", all or none. The output also stops, so waiting images are
+  /// outdated when it continues.
   DeviceFault stall(bool on);
-  /// The next frame comes as a damaged one. Between an output's instant, half a period after the camera's,
-  /// and the camera's next: the driver damages what comes first.
+  /// Damages the next frame. Call between an output's instant, half a period after the camera's, and the
+  /// camera's next one: the driver damages whichever comes first.
   DeviceFault damage();
 
  private:

@@ -18,13 +18,13 @@ struct Known {
   PlannedFaultKind kind;
   std::string_view name;
   bool imu, camera, trigger;
-  double value;  ///< where the line gives none
+  double value;  ///< default, if the line has no value
   double low, high;
 };
 
 constexpr double kLongestStep = 1e6;  // s
 constexpr double kWhite = 255;
-/// A flight of an hour has fewer; sums of as many steps fit a Duration.
+/// More than a flight of an hour needs; the sum of as many clock steps fits a Duration.
 constexpr std::size_t kMostFaults = 1000;
 
 constexpr std::array<Known, 8> kFaults = {{
@@ -166,7 +166,7 @@ const PlannedFault* FaultTimeline::active(FaultDevice device, PlannedFaultKind k
 
 bool FaultTimeline::strikes(const PlannedFault& fault, std::uint64_t n) const {
   const auto line = static_cast<std::uint64_t>(&fault - faults_.data());
-  constexpr std::uint64_t kSpread = 0x9E3779B97F4A7C15;  // neighbours draw independently
+  constexpr std::uint64_t kSpread = 0x9E3779B97F4A7C15;  // makes neighbouring draws independent
   return Random(n * kSpread, line).uniform() < fault.value;
 }
 

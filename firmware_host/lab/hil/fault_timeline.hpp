@@ -1,7 +1,7 @@
 #pragma once
-// What goes wrong when in a hardware-in-the-loop replay: read from a file, in lines of
-//   seconds after the first image, device, fault, for how many seconds, value
-// as `5.0,imu,stall,2.0` ('#' begins a comment; the value may be left out).
+// Faults of a hardware-in-the-loop replay, read from a file with lines of
+//   seconds after the first image, device, fault, duration in seconds, value
+// for example `5.0,imu,stall,2.0` ('#' begins a comment; the value is optional).
 //
 // Faults by device, and what their value is where they have one:
 //   imu      unplug       the port goes, the interface goes down, and returns
@@ -17,7 +17,7 @@
 //   trigger  drop         edges are lost; value: share of them, 0.5
 //            glitch       two edges for one
 //
-// The same file gives the same faults: what is drawn by chance is drawn from a seed that the line gives.
+// The same file gives the same faults: random choices use a seed derived from the line.
 
 #include <optional>
 #include <string>
@@ -62,13 +62,13 @@ class FaultTimeline {
   static FaultTimeline read(const std::string& path);
 
   [[nodiscard]] const std::vector<PlannedFault>& faults() const { return faults_; }
-  /// The fault of this kind that covers `time`, the first of them; null: none.
+  /// The first fault of this kind that is active at `time`; null: none.
   [[nodiscard]] const PlannedFault* active(FaultDevice device, PlannedFaultKind kind, Duration time) const;
-  /// Whether chance has it at the n-th occasion, with probability `share`: of the line and n alone.
+  /// Random decision for the n-th occasion, with probability `share`; depends only on the line and n.
   [[nodiscard]] bool strikes(const PlannedFault& fault, std::uint64_t n) const;
-  /// Sum of the clock's steps that have come by `time`.
+  /// Sum of the clock steps up to `time`.
   [[nodiscard]] Duration clockStep(Duration time) const;
-  /// The list, a line each in order of begin: the same for the same file.
+  /// The list with one line per fault, ordered by beginning; the same for the same file.
   [[nodiscard]] std::string text() const;
 
  private:

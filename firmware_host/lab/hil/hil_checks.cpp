@@ -16,22 +16,22 @@
 namespace swiftlet {
 namespace {
 
-// When a user must have been told.
+// Longest times until the user must have been told.
 constexpr Duration kUnplugShows{100'000'000};     // the next call on the device fails
-constexpr Duration kSilenceShows{1'300'000'000};  // silence is said after 1 s, looked for every 0.1 s
+constexpr Duration kSilenceShows{1'300'000'000};  // silence is reported after 1 s and checked every 0.1 s
 constexpr Duration kOddImagesShow{600'000'000};   // five images at 10 Hz, and one
-constexpr Duration kLossShows{2'000'000'000};     // a whole second of the watch lies within
-constexpr double kLossShare = 0.4;                // by chance one second loses less than half of it
-constexpr double kDarkGrey = 12;                  // the estimator's own limit of what is dark
+constexpr Duration kLossShows{2'000'000'000};     // includes a whole second of the rate watch
+constexpr double kLossShare = 0.4;                // by chance a second may lose less than half of it
+constexpr double kDarkGrey = 12;                  // the estimator's own limit for dark images
 constexpr double kSmallStep = 0.1;                // s; smaller ones may look like delay
-constexpr Duration kToldWithin{3'000'000'000};    // a clock's step back shows after 2 s at the latest
-// Health.
+constexpr Duration kToldWithin{3'000'000'000};    // a clock step is recognized after 2 s at the latest
+// Limits for health.
 constexpr Duration kLowered{500'000'000};        // a silent input shows by 0.3 s on the states' own stamps
 constexpr Duration kRecovered{3'000'000'000};    // reopened in 0.2 s, clock in 0.1 s, ten images, and margin
 constexpr Duration kBlindFailed{3'400'000'000};  // failed after 3 s without an image
-// Poses called good.
-constexpr double kWrongMotion = 0.06;  // m over 1 s, four times the worst of an undisturbed flight
-constexpr double kWrongStep = 0.03;    // m between images that follow each other: 0.6 m/s of nothing
+// Limits for poses with good health.
+constexpr double kWrongMotion = 0.06;  // m over 1 s, four times the largest error of an undisturbed flight
+constexpr double kWrongStep = 0.03;    // m between consecutive images: 0.6 m/s of false motion
 constexpr Duration kMotion{1'000'000'000};
 constexpr Duration kMostApart{20'000'000};
 
@@ -40,7 +40,7 @@ bool takesAway(const PlannedFault& fault) {
          (fault.device == FaultDevice::kImu && fault.kind == PlannedFaultKind::kGarbage);
 }
 
-/// While `other` lasts, its device cannot show `fault`, or shows both in one word.
+/// Whether `other` hides `fault` while it lasts, or both are reported with the same word.
 bool hides(const PlannedFault& other, const PlannedFault& fault) {
   if (&other == &fault || other.device != fault.device || other.kind == fault.kind) return false;
   switch (fault.kind) {
@@ -71,7 +71,7 @@ std::string deviceStart(FaultDevice device) {
   return "trigger (";
 }
 
-/// What a user reads of each kind, any of them.
+/// Texts that tell the user of a fault; any of them counts.
 std::span<const std::string_view> wordsOf(PlannedFaultKind kind) {
   static constexpr std::array<std::string_view, 3> kGone = {": gone", ": not there", ": down"};
   static constexpr std::array<std::string_view, 2> kNothing = {": sends nothing", ": sends unexpected data"};
@@ -100,7 +100,7 @@ std::span<const std::string_view> wordsOf(PlannedFaultKind kind) {
   return kMuch;
 }
 
-/// For how long a fault must show until it must be told; empty: never.
+/// Time that a fault must last before it must be reported; empty: never.
 std::optional<Duration> toldAfter(const PlannedFault& fault) {
   switch (fault.kind) {
     case PlannedFaultKind::kUnplug:
@@ -155,7 +155,7 @@ class Checker {
     checks_.push_back({std::move(name), passed, passed ? std::move(good) : std::move(bad)});
   }
   [[nodiscard]] Duration time(Stamp stamp) const { return stamp - e_.first_image; }
-  /// From when on every fault is over; a step is over at once.
+  /// Time from which on every fault is over; a step is over at once.
   [[nodiscard]] Duration calm(std::optional<FaultDevice> device = std::nullopt) const {
     Duration end;
     for (const PlannedFault& fault : e_.faults.faults()) {
@@ -166,7 +166,7 @@ class Checker {
   }
   [[nodiscard]] Duration played() const { return time(e_.last_image); }
 
-  /// Faults of one kind that run into each other are one to who reads: told when the first begins.
+  /// Overlapping faults of one kind are reported once, when the first begins.
   [[nodiscard]] Duration beginOfChain(const PlannedFault& fault) const {
     Duration begin = fault.begin;
     for (bool grew = true; grew;) {
@@ -186,7 +186,7 @@ class Checker {
     const Duration from = beginOfChain(fault);
     const FaultStretch shown = longestVisible(fault, e_.faults);
     Duration until = shown.end + kToldWithin;
-    // A step that nobody hears shows when the sensor is heard again.
+    // A clock step that cannot be noticed becomes visible when the sensor is heard again.
     if (fault.kind == PlannedFaultKind::kClockStep)
       until = std::max(shown.begin, calm(fault.device)) + kToldWithin;
     const bool steps = fault.kind == PlannedFaultKind::kClockStep;
@@ -208,7 +208,7 @@ class Checker {
             from.seconds(), until.seconds()));
   }
 
-  /// The lines of a device end with one that ends what stood.
+  /// A device's lines must end with one that ends its current fault.
   void checkReturned(FaultDevice device) {
     const Duration until = calm(device) + kRecovered;
     if (until > played()) return;
@@ -267,7 +267,7 @@ class Checker {
     });
   }
 
-  /// Both cameras away for longer than coasting is trusted: failed.
+  /// If both cameras are lost for longer than coasting is trusted, health must be failed.
   void checkBlind() {
     constexpr Duration kStep{10'000'000};
     Duration since = Duration{-1};
@@ -299,7 +299,7 @@ class Checker {
                     from.seconds()));
   }
 
-  /// Motion over a second within stretches of good poses, beside the truth's.
+  /// Compares the motion over a second with the truth's, within stretches of good poses.
   void checkPoses(const std::string& what, const std::vector<HilEvidence::Judged>& poses, bool steps) {
     if (e_.truth.empty()) return;
     double worst = 0;
@@ -351,7 +351,7 @@ class Checker {
 }  // namespace
 
 FaultStretch longestVisible(const PlannedFault& fault, const FaultTimeline& faults) {
-  // Between the ends of what hides it.
+  // Between the ends of the faults that hide it.
   std::vector<Duration> edges = {fault.begin, fault.begin + fault.length};
   for (const PlannedFault& other : faults.faults()) {
     if (!hides(other, fault)) continue;

@@ -1,7 +1,7 @@
 #pragma once
-// Whether a flight on a hardware-in-the-loop replay was what it must be: each fault told by the device's name
-// with its remedy, health lowered while it lasts and good again after it, no wrong pose called good, no end
-// missing. docs/hil.md gives the rules with their reasons.
+// Checks a flight on a hardware-in-the-loop replay: each fault is reported with the device's name and its
+// remedy, health is lowered while it lasts and good again afterwards, no wrong pose has good health, every
+// fault's end is reported. docs/hil.md gives the rules with their reasons.
 
 #include <string>
 #include <vector>
@@ -13,7 +13,7 @@ namespace swiftlet {
 struct HilCheck {
   std::string name;  ///< "told: imu unplug at 4.000 s"
   bool passed = false;
-  std::string says;  ///< what was found, in a sentence
+  std::string says;  ///< the finding, in one sentence
 };
 
 class HilVerdict {
@@ -22,9 +22,9 @@ class HilVerdict {
 
   [[nodiscard]] const std::vector<HilCheck>& checks() const { return checks_; }
   [[nodiscard]] bool passed() const;
-  /// A line each.
+  /// One line per check.
   [[nodiscard]] std::string text() const;
-  /// JUnit XML, a test case each; `suite` names the flight.
+  /// JUnit XML with one test case per check; `suite`: name of the flight.
   [[nodiscard]] std::string junit(const std::string& suite) const;
 
  private:
@@ -33,7 +33,7 @@ class HilVerdict {
 
 HilVerdict checkHil(const HilEvidence& evidence);
 
-/// The longest part of a fault during which its device shows it, other faults of the device hiding the rest.
+/// The longest part of a fault during which the device shows it; other faults of the device hide the rest.
 struct FaultStretch {
   Duration begin, end;  ///< after the first image
   [[nodiscard]] Duration length() const { return end - begin; }

@@ -22,7 +22,7 @@ struct HealthChange {
   std::uint32_t epoch = 0;
 };
 
-/// A word from another version is no praise.
+/// An unknown word, from another version, counts as failed.
 Health healthOf(const std::string& name) { return healthNamed(name).value_or(Health::kFailed); }
 
 Json readJson(const fs::path& path) {

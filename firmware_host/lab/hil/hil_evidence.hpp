@@ -1,5 +1,5 @@
 #pragma once
-// What a hardware-in-the-loop replay and the flight on it have left in their folders, read for its checks.
+// Reads for the checks what a hardware-in-the-loop replay and the flight on it left in their folders.
 
 #include <string>
 #include <vector>
@@ -25,16 +25,16 @@ struct HilEvidence {
 
   FaultTimeline faults;
   Stamp first_image, last_image;  ///< CLOCK_MONOTONIC, as all stamps here
-  bool complete = false;          ///< played to the end, every image when it was due
+  bool complete = false;          ///< played to the end, with every image at its due time
   bool finished = false;          ///< the flight finished normally
-  std::vector<Line> remarks;      ///< of events.log
-  std::vector<Judged> frames;     ///< odometry.tum
-  std::vector<Judged> states;     ///< imu_rate.tum; empty if the flight did not write it
+  std::vector<Line> remarks;      ///< from events.log
+  std::vector<Judged> frames;     ///< from odometry.tum
+  std::vector<Judged> states;     ///< from imu_rate.tum; empty if the flight did not write it
   Trajectory truth;               ///< empty: the log has none
 };
 
-/// `run`: of `swiftlet fly`; `hil`: of `swiftlet hil`. InputError if hil.json, faults.csv or events.log
-/// cannot be read; what a broken flight did not write is empty.
+/// `run`: folder of `swiftlet fly`; `hil`: folder of `swiftlet hil`. InputError if hil.json, faults.csv or
+/// events.log cannot be read; what a broken flight did not write is empty.
 HilEvidence readHilEvidence(const std::string& run, const std::string& hil);
 
 }  // namespace swiftlet

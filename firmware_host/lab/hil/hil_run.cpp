@@ -22,19 +22,19 @@
 namespace swiftlet {
 namespace {
 
-/// A log's images may be off the cameras' instants by so much: their stamps say when they were taken, and the
-/// camera will say when they were shown.
+/// Largest distance of a log's images from the cameras' instants: their stamps say when they were taken, and
+/// the camera will report when they were shown.
 constexpr Duration kOffGrid = Duration::fromMilliseconds(1);
-/// How often all devices are looked at while nothing is due.
+/// Period at which all devices are checked while nothing is due.
 constexpr Duration kLook = Duration{500'000};
-/// The driver shows its last images only while more come behind them.
+/// Slots after the last image: the driver shows its last images only while more follow.
 constexpr std::int64_t kSlotsBehind = 6;
 
 void demand(const DeviceFault& fault, const std::string& device, const char* setting) {
   if (!fault.ok()) throw InputError("settings", 0, setting, describe(fault, device), "");
 }
 
-/// Pulls the trigger's line.
+/// Drives the trigger's line.
 class PlayedTrigger {
  public:
   PlayedTrigger(std::string file, const FaultTimeline& faults) : file_(std::move(file)), faults_(faults) {
@@ -49,7 +49,7 @@ class PlayedTrigger {
     last_slot_ = last_slot;
   }
 
-  /// At each instant up, a quarter of a period later down.
+  /// Up at each instant, down a quarter of a period later.
   void step(Stamp now) {
     const std::optional<Stamp> when = due();
     if (!when || now < *when) return;
@@ -89,7 +89,7 @@ class PlayedTrigger {
 
  private:
   enum class Next : std::uint8_t { kUp, kGlitchDown, kGlitchUp, kDown };
-  /// Each half of a glitch: the kernel's simulated line makes one interrupt of what comes at once.
+  /// Half the length of a glitch: the kernel's simulated line merges immediate edges into one interrupt.
   static constexpr Duration kGlitch = Duration::fromMilliseconds(1);
 
   void raise(Duration time) {
@@ -201,7 +201,7 @@ class HilRun {
     }
     const Stamp earliest = hostNow() + Duration::fromSeconds(request_.lead + 2 * grid_.period.seconds());
     grid_.first = Stamp{(earliest.ns / grid_.period.ns + 1) * grid_.period.ns};
-    // By the log's list of images.
+    // From the log's list of images.
     last_slot_ = static_cast<std::int64_t>(source_->frameCount()) - 1;
     if (request_.seconds > 0) {
       last_slot_ =
@@ -216,7 +216,7 @@ class HilRun {
     const Trajectory truth = source_->groundTruth();
     if (truth.empty()) return;
     WholeFile file(std::filesystem::path(request_.out) / "truth.tum");
-    // Of what is played.
+    // Truth of the played part.
     for (const TrajectoryPoint& point : truth) {
       const Stamp host = grid_.toHost(point.stamp);
       if (host < grid_.first || host > grid_.instant(last_slot_)) continue;
@@ -242,7 +242,7 @@ class HilRun {
     return true;
   }
 
-  /// A fault that nobody planned ends the replay, which says so in its report.
+  /// An unplanned fault ends the replay, and the report says so.
   bool broke(const DeviceFault& fault, const std::string& device) {
     if (fault.ok()) return false;
     fault_ = describe(fault, device);
@@ -294,7 +294,7 @@ class HilRun {
   PlayedTrigger trigger_;
   FrameGrid grid_;
   std::int64_t last_slot_ = 0;
-  std::string fault_;  ///< that was not planned
+  std::string fault_;  ///< unplanned fault
 };
 
 }  // namespace

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A pseudo-terminal, and a link to it under the port's name.
+/// A pseudo-terminal, with a link to it under the port's name.
 class SerialWire : public ImuWire {
  public:
   explicit SerialWire(const ImuLinkGroup& settings)
@@ -50,7 +50,7 @@ class SerialWire : public ImuWire {
   }
 
   bool isRead() override {
-    // A reader throws away what waited before it came.
+    // A reader discards what was queued before it opened the port.
     std::size_t taken = 0;
     constexpr std::array<std::uint8_t, 1> kProbe = {0};
     if (!probed_) static_cast<void>(terminal_.send(kProbe, taken));
@@ -61,7 +61,7 @@ class SerialWire : public ImuWire {
   DeviceFault send(const ImuReading& reading) override {
     std::array<std::uint8_t, ImuEncoder::kLongestFrame> frame;
     const std::size_t length = encoder_.encode(reading, frame);
-    // What the program says, to an autopilot for one, has nobody to hear it.
+    // Bytes from the program, for example for an autopilot, are read and discarded.
     std::array<std::uint8_t, 256> heard;
     std::size_t count = 0;
     static_cast<void>(terminal_.receive(heard, count));
@@ -77,7 +77,7 @@ class SerialWire : public ImuWire {
 
  private:
   DeviceFault write(std::span<const std::uint8_t> bytes) {
-    // What nobody reads is lost, as on a wire.
+    // Bytes without a reader are lost, as on a real wire.
     std::size_t taken = 0;
     return terminal_.send(bytes, taken);
   }
@@ -105,7 +105,7 @@ class CanWire : public ImuWire {
     return bus_.isOpen() ? DeviceFault{} : bus_.open(settings_);
   }
   DeviceFault unplug() override {
-    // A socket on an interface that goes down keeps the error until somebody sends.
+    // A socket on an interface that goes down keeps the error until the next send.
     bus_.close();
     return setUp(false);
   }
@@ -154,7 +154,7 @@ class CanWire : public ImuWire {
     return fault;
   }
 
-  /// That the message claims, s: the means, which are read, do not depend on it.
+  /// Interval stated in the message, s. Readers use the means, which do not depend on it.
   static constexpr float kInterval = 0.0025F;
 
   std::string name_;

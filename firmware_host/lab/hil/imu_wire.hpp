@@ -1,6 +1,6 @@
 #pragma once
 // The wire on which a hardware-in-the-loop replay plays an IMU: a pseudo-terminal under the name of the
-// serial port that the vehicle's settings give, or a CAN interface.
+// serial port in the vehicle's settings, or a CAN interface.
 
 #include <memory>
 
@@ -20,15 +20,15 @@ class ImuWire {
   virtual DeviceFault open() = 0;
   /// Takes the device away, as if unplugged; open() brings it back.
   virtual DeviceFault unplug() = 0;
-  /// A reader is connected; on a bus this is unknown: true.
+  /// Whether a reader is connected; true on a bus, where it is unknown.
   [[nodiscard]] virtual bool isRead() = 0;
-  /// Sends a reading; what comes the other way is thrown away.
+  /// Sends a reading; received bytes are discarded.
   virtual DeviceFault send(const ImuReading& reading) = 0;
-  /// Sends bytes that are none; nothing on a bus, whose controller would drop them.
+  /// Sends bytes that are not a message; nothing on a bus, whose controller would drop them.
   virtual DeviceFault sendGarbage(std::uint64_t seed) = 0;
 };
 
-/// As settings name it.
+/// Makes the wire named in the settings.
 std::unique_ptr<ImuWire> makeImuWire(const ImuLinkGroup& settings);
 
 }  // namespace swiftlet

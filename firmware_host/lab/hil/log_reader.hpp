@@ -30,7 +30,7 @@ class LogReader {
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
 
-  /// The next one, waiting for it; empty at the end. What ended the reading before is thrown.
+  /// Waits for the next one; empty at the end. Rethrows the error that ended reading.
   std::optional<ImuSample> sample();
   std::optional<Image> image(std::size_t camera);
 

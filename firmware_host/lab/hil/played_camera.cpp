@@ -17,7 +17,7 @@ DeviceFault PlayedCamera::open(const std::string& output, const std::string& cap
 void PlayedCamera::begin(const FrameGrid& grid, Stamp now, std::int64_t last_slot) {
   grid_ = grid;
   last_slot_ = last_slot;
-  // The first instant for which two images can be written in time.
+  // The first instant that leaves time for two images.
   slot_ = std::min<std::int64_t>((now - grid.first).ns / grid.period.ns + 2, 0);
   streamed_ = slot_;
 }
@@ -26,7 +26,8 @@ DeviceFault PlayedCamera::step(Stamp now) {
   if (DeviceFault fault = followFaults(now - grid_.first); !fault.ok()) return fault;
   if (DeviceFault fault = damageNext(now); !fault.ok()) return fault;
   watchSlips(now);
-  // The second half of the period before the last one waits: no more than two images ever do.
+  // At most two images wait: the next is written in the second half of the period before the last waiting
+  // one.
   while (!ended() && now >= grid_.instant(slot_) - Duration{grid_.period.ns * 3 / 2}) {
     const bool late = now >= grid_.instant(slot_);
     if (unplugged_ || stalled_ || late) {
@@ -40,7 +41,7 @@ DeviceFault PlayedCamera::step(Stamp now) {
     if (DeviceFault fault = showSlot(); !fault.ok()) return fault;
     ++slot_;
   }
-  // What the driver holds back is pushed out by what comes behind it.
+  // Further images push out those that the driver holds back.
   if (ended() && !unplugged_ && !stalled_ && player_.wantsImage()) return player_.showDark(0);
   return {};
 }
@@ -72,14 +73,14 @@ DeviceFault PlayedCamera::followFaults(Duration time) {
     return player_.unplug();
   }
   if (!gone && unplugged_) {
-    // Whoever closes the node last brings it back.
+    // The node returns when its last user closes it.
     if (!reopen()) return {};
     unplugged_ = false;
   }
   if (unplugged_) return {};
   const bool still = faults_.active(device_, PlannedFaultKind::kStall, time) != nullptr;
   if (still == stalled_) return {};
-  // What waited in the driver is old.
+  // Images that waited in the driver are outdated.
   if (!still && !reopen()) return {};
   stalled_ = still;
   return player_.stall(still);
@@ -104,11 +105,11 @@ DeviceFault PlayedCamera::damageNext(Stamp now) {
   return player_.damage();
 }
 
-/// The driver lets an image go half a period after its instant: at three quarters as many must be gone as
-/// there were instants.
+/// The driver releases an image half a period after its instant: at three quarters, the number of released
+/// images must equal the number of instants.
 void PlayedCamera::watchSlips(Stamp now) {
   if (unplugged_ || stalled_ || now < grid_.instant(streamed_)) return;
-  // Rounded down before the first slot too.
+  // Rounded down also before the first slot.
   const std::int64_t since = (now - grid_.first).ns;
   const std::int64_t slot = since / grid_.period.ns - (since < 0 ? 1 : 0);
   const std::int64_t part = (now - grid_.instant(slot)).ns;

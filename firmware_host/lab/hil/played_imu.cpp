@@ -5,7 +5,7 @@
 namespace swiftlet {
 namespace {
 
-/// Where the sensor's clock stands at the log's first image: it was switched on some time before.
+/// Reading of the sensor's clock at the log's first image: the sensor was switched on some time before.
 constexpr Duration kSensorUptime = Duration::fromMilliseconds(1'234'567);
 constexpr double kMillion = 1e6;
 
@@ -22,7 +22,7 @@ PlayedImu::PlayedImu(std::unique_ptr<ImuWire> wire, LogReader& reader, const Fau
 
 void PlayedImu::begin(const FrameGrid& grid, Stamp last_log) {
   grid_ = grid;
-  // A vehicle that moves in front of black images is a flight that nobody made.
+  // Samples from before the first image are skipped: motion in front of black images would be inconsistent.
   while (next_ && next_->stamp < grid.first_log - grid.period) next_ = reader_.sample();
   last_log_ = last_log;
 }

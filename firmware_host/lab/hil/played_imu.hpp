@@ -1,6 +1,6 @@
 #pragma once
-// The IMU of a hardware-in-the-loop replay: the log's samples on its wire when they are due, in a clock of
-// the sensor's own, and what the faults make of them.
+// The IMU of a hardware-in-the-loop replay: sends the log's samples when they are due, stamped by a simulated
+// sensor clock, with the effect of faults.
 
 #include <memory>
 #include <optional>
@@ -19,10 +19,10 @@ class PlayedImu {
  public:
   struct Counters {
     std::uint64_t sent = 0;
-    std::uint64_t withheld = 0;  ///< by faults
+    std::uint64_t withheld = 0;  ///< not sent because of faults
   };
 
-  /// `correction`: samples of logs are corrected and in body axes, a sensor sends its own readings.
+  /// `correction`: a log's samples are corrected and in body axes; the sensor sends its own readings.
   PlayedImu(std::unique_ptr<ImuWire> wire, LogReader& reader, const FaultTimeline& faults,
             const ImuCorrection& correction, double skew_ppm);
 
@@ -33,10 +33,10 @@ class PlayedImu {
   void begin(const FrameGrid& grid, Stamp last_log);
 
   DeviceFault step(Stamp now);
-  /// When the next sample is due; empty at the end.
+  /// Due time of the next sample; empty at the end.
   [[nodiscard]] std::optional<Stamp> due() const;
   [[nodiscard]] const Counters& counters() const { return counters_; }
-  /// By which samples went out late.
+  /// Delay with which samples were sent.
   [[nodiscard]] const LatencyHistogram& lateness() const { return lateness_; }
 
  private:

@@ -14,7 +14,7 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::size_t kHead = 8;
 constexpr double kMostSamples = 1e15;  // a double counts them one by one
-constexpr int kDeepest = 8;            // entries within entries; files have three
+constexpr int kDeepest = 8;            // nested entries; files have three levels
 
 std::uint64_t bigEndian(Bytes bytes) {
   std::uint64_t value = 0;
@@ -24,13 +24,13 @@ std::uint64_t bigEndian(Bytes bytes) {
 
 struct Entry {
   std::string_view key;
-  char type = 0;  ///< 0: entries within
+  char type = 0;  ///< 0: contains entries
   std::size_t size = 0;
   std::size_t count = 0;
   Bytes data;
 };
 
-/// Takes the first entry off `rest`.
+/// Removes the first entry from `rest` and returns it.
 std::optional<Entry> takeEntry(Bytes& rest) {
   if (rest.size() < kHead) return std::nullopt;
   Entry entry;
@@ -88,7 +88,7 @@ double numberOf(char type, Bytes bytes) {
   }
 }
 
-/// The numbers of an entry; empty: it holds none.
+/// The numbers of an entry; empty if it has none.
 std::vector<double> numbersOf(const Entry& entry) {
   std::vector<double> numbers;
   const std::size_t each = bytesOf(entry.type);
@@ -99,14 +99,14 @@ std::vector<double> numbersOf(const Entry& entry) {
   return numbers;
 }
 
-/// What a stream's entries say of the values that follow them.
+/// Properties of the values that follow in a stream.
 struct Stream {
   std::array<double, 3> scale = {1, 1, 1};
   std::string orientation;
   std::optional<std::uint64_t> total;
 };
 
-/// Row `axis` of the result is channel's of that letter.
+/// Matrix whose row for an axis selects the channel with that letter.
 std::optional<Eigen::Matrix3d> axesOf(const std::string& orientation) {
   if (orientation.size() < 3) return Eigen::Matrix3d::Identity();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
@@ -116,7 +116,7 @@ std::optional<Eigen::Matrix3d> axesOf(const std::string& orientation) {
     if (axis < 0 || axis > 2) return std::nullopt;
     axes(axis, channel) = letter < 'a' ? 1 : -1;
   }
-  // Each axis once.
+  // Each axis must occur once.
   if (std::abs(axes.determinant()) < 0.5) return std::nullopt;
   return axes;
 }
@@ -155,7 +155,7 @@ bool read(Bytes bytes, int depth, GpmfPayload& payload) {
     if (entry->type == 0) {
       good = depth < kDeepest && read(entry->data, depth + 1, payload);
     } else if (entry->key == "SCAL") {
-      // Of other sensors than these it may hold anything.
+      // For other sensors the entry may have any content.
       if (!setScale(*entry, stream)) stream.scale = {1, 1, 1};
     } else if (entry->key == "ORIN") {
       stream.orientation.assign(reinterpret_cast<const char*>(entry->data.data()), entry->data.size());

@@ -19,13 +19,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of a video without a clock of its own: before it lies room for the calibration's time shift.
+/// For a video without its own clock: leaves room for the calibration's time shift.
 constexpr Stamp kFirstImage{Duration::fromSeconds(1).ns};
 
-/// What goes into a log, read before anything is written.
+/// Input of a log, read before anything is written.
 struct Recording {
-  std::vector<std::string> videos;                     ///< one a camera
-  std::array<std::vector<Stamp>, kMaxCameras> stamps;  ///< of the pictures; empty: the file's own times
+  std::vector<std::string> videos;                     ///< one per camera
+  std::array<std::vector<Stamp>, kMaxCameras> stamps;  ///< of the images; empty: the file's own times
   std::vector<ImuSample> samples;
 };
 
@@ -76,7 +76,7 @@ Recording videoRecording(const ImportRequest& request, ImportResult& result) {
   return recording;
 }
 
-/// The folder grows under another name until it is whole.
+/// The folder is filled under another name and renamed when complete.
 class LogFolder {
  public:
   explicit LogFolder(const std::string& out) : out_(out), part_(out + ".part") {
@@ -118,7 +118,7 @@ class LogFolder {
   bool finished_ = false;
 };
 
-/// Stamps of the images that were written.
+/// Returns the stamps of the images written.
 std::vector<Stamp> writeCamera(const ImportRequest& request, const Recording& recording, std::size_t camera,
                                const fs::path& folder, ImportResult& result) {
   // The csv's clock is known at the first image; a GoPro's samples count from the file's time zero.
@@ -131,7 +131,7 @@ std::vector<Stamp> writeCamera(const ImportRequest& request, const Recording& re
   std::vector<Stamp> stamps;
   VideoFrame frame;
   Duration begin;
-  bool more = false;  // pictures than stamps
+  bool more = false;  // more images than stamps
   Progress progress(fmt::format("images of camera {}", camera), video.pictures());
   for (std::size_t i = 0; video.nextFrame(frame); ++i) {
     if (frame.image.width != video.width() || frame.image.height != video.height()) {

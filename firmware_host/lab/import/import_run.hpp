@@ -1,5 +1,5 @@
 #pragma once
-// A video and its IMU as an EuRoC/ASL folder, which every command takes as a log.
+// Converts a video and its IMU data to an EuRoC/ASL folder, which every command accepts as a log.
 
 #include <cstdint>
 #include <optional>
@@ -12,16 +12,16 @@ namespace swiftlet {
 
 struct ImportRequest {
   std::string video;            ///< a video file, or the folder of a phone's log (data.jsonl, data.mp4)
-  std::string imu;              ///< csv in EuRoC's columns; empty: the video's own, a GoPro's
+  std::string imu;              ///< csv with EuRoC's columns; empty: the video's own data (GoPro)
   std::string calibration;      ///< written into the log; empty: none
-  std::string imu_calibration;  ///< Kalibr's IMU file, where it is not beside the camchain
-  std::optional<Stamp> first;   ///< stamp of the csv's clock at the first image; empty: 1 s
+  std::string imu_calibration;  ///< Kalibr's IMU file, if it is not beside the camchain
+  std::optional<Stamp> first;   ///< time of the first image on the csv's clock; empty: 1 s
   std::string out;
 };
 
 struct ImportResult {
   std::size_t cameras = 0;
-  std::size_t images = 0;  ///< of all cameras
+  std::size_t images = 0;  ///< of all cameras together
   std::uint64_t damaged = 0;
   std::size_t samples = 0;
   double imu_hz = 0;
@@ -29,8 +29,8 @@ struct ImportResult {
   std::vector<std::string> warnings;
 };
 
-/// InputError: a file that cannot be read, clocks that do not overlap, `out` that holds a log already.
-/// Nothing is left in `out` then.
+/// InputError: a file that cannot be read, clocks that do not overlap, or an existing log in `out`. Nothing
+/// is left in `out` then.
 ImportResult importVideo(const ImportRequest& request);
 
 }  // namespace swiftlet

@@ -20,11 +20,11 @@ using Json = nlohmann::json;
 constexpr const char* kPhoneRemedy =
     "A line is {\"time\": s, \"sensor\": {\"type\": \"gyroscope\", \"values\": [x, y, z]}}";
 
-/// Times of samples from how many there were at certain times.
+/// Times of samples from sample counts at known times.
 ///
-/// The rate is that of the line of least squares. Counts grow in steps, since a sensor's samples come in
-/// batches, so that line runs late by half a batch on average; but none is counted before it was measured. So
-/// the line is moved to where it reaches each count by its time.
+/// The rate is the slope of the least-squares line. Counts grow in steps, because samples come in batches, so
+/// that line is late by half a batch on average. No sample is counted before it was measured, so the line is
+/// moved until it reaches each count no later than the count's time.
 class CountLine {
  public:
   void add(double count, double seconds) { points_.emplace_back(count, seconds); }
@@ -40,7 +40,7 @@ class CountLine {
     for (const Eigen::Vector2d& point : points_) begin_ = std::min(begin_, point.y() - period_ * point.x());
     return period_ > 0;
   }
-  /// Of the sample with this number [s].
+  /// Time of the sample with this number [s].
   [[nodiscard]] double at(double number) const { return begin_ + period_ * number; }
 
  private:
@@ -49,7 +49,7 @@ class CountLine {
   double begin_ = 0;
 };
 
-/// Of one sensor: the value stands for the gyro's and the accelerometer's.
+/// Sample of one sensor: the value is used for both gyro and accelerometer.
 ImuSample both(Stamp stamp, const Eigen::Vector3d& value) {
   ImuSample sample;
   sample.stamp = stamp;
@@ -66,11 +66,11 @@ std::vector<ImuSample> dated(const std::string& name, const std::vector<Metadata
   double count = 0;
   for (std::size_t i = 0; i < payloads.size(); ++i) {
     const GpmfChannel& channel = payloads[i].*which;
-    // Counts go on from a payload before the file's first where it was cut out of a longer recording.
+    // If the file was cut from a longer recording, counts continue from the payload before the file's first.
     if (channel.counted) count = std::max(count, static_cast<double>(channel.before));
     line.add(count, packets[i].begin.seconds());
     for (const Eigen::Vector3d& value : channel.values) counted.emplace_back(count++, value);
-    // The last of several is shorter than it says: the recording ended within it.
+    // The last of several payloads is shorter than stated: the recording ended within it.
     if (payloads.size() == 1) line.add(count, (packets[i].begin + packets[i].length).seconds());
   }
   if (counted.empty() || !line.fit()) {
@@ -83,7 +83,7 @@ std::vector<ImuSample> dated(const std::string& name, const std::vector<Metadata
   return samples;
 }
 
-/// Empty: no time that a stamp can hold.
+/// Empty if the time does not fit a stamp.
 std::optional<Stamp> stampOf(const Json& json) {
   constexpr double kLatest = 9e9;  // s
   const double time = json.at("time").get<double>();
@@ -143,7 +143,7 @@ PhoneLog readPhoneLog(const std::string& name, std::string_view text) {
                        kPhoneRemedy);
     }
   }
-  // Phones write each sensor in bursts.
+  // Phones write the samples of each sensor in bursts.
   std::ranges::stable_sort(gyro, {}, &ImuSample::stamp);
   std::ranges::stable_sort(accel, {}, &ImuSample::stamp);
   std::uint64_t left_out = 0;

@@ -1,11 +1,11 @@
 #pragma once
-// The IMU that belongs to a video: GoPro's, out of the file's own metadata, or a phone logger's JSON lines.
+// The IMU data of a video: from GoPro's metadata in the file, or from a phone logger's JSON lines.
 //
-// GoPro counts its samples and gives no stamps: a line along the counts at the begins of the payloads,
-// which have times, dates each sample. Phone loggers (Spectacular AI's, AaltoVision's jsonl-recorder) write a
-// JSON object a line: {"time": s, "sensor": {"type": "gyroscope" or "accelerometer", "values": [x, y, z]}},
-// and for each image {"time": s, "frames": [{"cameraInd": 0}, ...]}. In both, gyro and accelerometer have
-// stamps of their own: the accelerometer is interpolated to the gyro's. Errors: InputError.
+// GoPro counts its samples and gives no stamps: each sample is dated by a line through the counts at the
+// starts of the payloads, which have times. Phone loggers (Spectacular AI's, AaltoVision's jsonl-recorder)
+// write one JSON object per line: {"time": s, "sensor": {"type": "gyroscope" or "accelerometer", "values":
+// [x, y, z]}}, and for each image {"time": s, "frames": [{"cameraInd": 0}, ...]}. In both, gyro and
+// accelerometer have separate stamps: the accelerometer is interpolated to the gyro's. Errors: InputError.
 
 #include <array>
 #include <string>
@@ -18,13 +18,13 @@
 
 namespace swiftlet {
 
-/// Stamps: `zero` is the file's time zero. `name` names the file in messages.
+/// `zero`: stamp of the file's time zero. `name`: the file's name in messages.
 std::vector<ImuSample> goproImu(const std::string& name, const std::vector<MetadataPacket>& packets,
                                 Stamp zero);
 
 struct PhoneLog {
   std::vector<ImuSample> samples;
-  std::array<std::vector<Stamp>, kMaxCameras> images;  ///< of each video's pictures, in their order
+  std::array<std::vector<Stamp>, kMaxCameras> images;  ///< of each video's images, in order
 };
 PhoneLog readPhoneLog(const std::string& name, std::string_view text);
 

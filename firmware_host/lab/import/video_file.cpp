@@ -55,7 +55,7 @@ struct VideoFile::Codec {
 bool canReadVideos() { return true; }
 
 VideoFile::VideoFile(const std::string& path) : path_(path), codec_(std::make_unique<Codec>()) {
-  av_log_set_level(AV_LOG_QUIET);  // what goes wrong comes back as a value
+  av_log_set_level(AV_LOG_QUIET);  // errors are returned as values
   AVFormatContext* opened = nullptr;
   int result = avformat_open_input(&opened, path.c_str(), nullptr, nullptr);
   codec_->file.reset(opened);
@@ -113,7 +113,7 @@ std::vector<MetadataPacket> VideoFile::metadata() {
   return packets;
 }
 
-/// The next picture into `frame`; false at the end.
+/// Decodes the next image into `frame`; false at the end.
 bool VideoFile::receive() {
   AVCodecContext* decoder = codec_->decoder.get();
   AVPacket* packet = codec_->packet.get();
@@ -125,7 +125,7 @@ bool VideoFile::receive() {
     if (av_read_frame(codec_->file.get(), packet) < 0) {
       if (codec_->ended) return false;
       codec_->ended = true;
-      static_cast<void>(avcodec_send_packet(decoder, nullptr));  // the pictures that it still holds
+      static_cast<void>(avcodec_send_packet(decoder, nullptr));  // flushes the images that it still holds
       continue;
     }
     if (packet->stream_index == codec_->video->index && avcodec_send_packet(decoder, packet) < 0) ++damaged_;

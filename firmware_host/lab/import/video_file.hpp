@@ -1,9 +1,9 @@
 #pragma once
-// A video file through FFmpeg's libraries: grey images with their times, and GoPro's metadata track.
+// Reads a video file with FFmpeg's libraries: grey images with their times, and GoPro's metadata track.
 //
-// Grey is the luma plane as coded: neither its range is stretched nor the picture turned, as with live
-// cameras. Errors: InputError that names the file. Pictures that cannot be decoded are counted and left out.
-// Host side: allocates; memory of the codec's own pictures. One thread.
+// Grey is the luma plane as coded: its range is not stretched and the image not rotated, as with live
+// cameras. Errors: InputError naming the file. Images that cannot be decoded are counted and skipped. Host
+// side: allocates; memory for the codec's own images. One thread.
 
 #include <cstdint>
 #include <memory>
@@ -17,10 +17,10 @@ namespace swiftlet {
 
 struct VideoFrame {
   Duration time;    ///< since the file's time zero
-  ImageView image;  ///< until the next call
+  ImageView image;  ///< valid until the next call
 };
 
-/// A payload of the track `gpmd`, which holds what a GoPro measured during its length.
+/// A payload of the track `gpmd`: what a GoPro measured during the payload's length.
 struct MetadataPacket {
   Duration begin;  ///< since the file's time zero
   Duration length;
@@ -36,13 +36,13 @@ class VideoFile {
 
   [[nodiscard]] int width() const;
   [[nodiscard]] int height() const;
-  [[nodiscard]] double rate() const;  ///< images a second, mean; 0: the file does not say
+  [[nodiscard]] double rate() const;  ///< mean images per second; 0: unknown
 
-  [[nodiscard]] std::uint64_t pictures() const;  ///< 0: the file does not say
+  [[nodiscard]] std::uint64_t pictures() const;  ///< 0: unknown
 
-  /// All of it; empty: the file has no such track. Before the first nextFrame().
+  /// The whole metadata track; empty if the file has none. Call before the first nextFrame().
   [[nodiscard]] std::vector<MetadataPacket> metadata();
-  /// In the order of time; false at the end.
+  /// Images in the order of time; false at the end.
   bool nextFrame(VideoFrame& frame);
   [[nodiscard]] std::uint64_t damaged() const { return damaged_; }
 
