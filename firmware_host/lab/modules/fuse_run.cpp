@@ -24,7 +24,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// CPU of a step's parts.
+/// CPU time of a step's parts.
 struct MapTimes {
   LatencyHistogram depth;
   LatencyHistogram volume;
@@ -49,7 +49,7 @@ Json timingJson(const MapTimes& times) {
   return json;
 }
 
-/// What one run is made of, from opening to the summary.
+/// The parts of one run, from opening to the summary.
 class FuseRun {
  public:
   FuseRun(const FuseRequest& request, const Settings& settings)
@@ -128,7 +128,7 @@ void FuseRun::begin() {
 
 void FuseRun::openKept() {
   if (!request_.keep.empty()) {
-    // Now and not after an hour's work.
+    // Checked now, not after an hour's work.
     const std::filesystem::path folder = std::filesystem::absolute(request_.keep).parent_path();
     if (!std::filesystem::is_directory(folder) || std::filesystem::is_directory(request_.keep)) {
       throw InputError(request_.keep, 0, "--keep", "is not a file in a folder that exists",
@@ -142,7 +142,7 @@ void FuseRun::openKept() {
 void FuseRun::take(const StereoFrame& frame) {
   if (!any_frame_) {
     any_frame_ = true;
-    // What was measured before the part of the log that is wanted is not.
+    // Depth images before the requested section are skipped.
     while (next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp < frame.stamp)
       ++next_depth_;
   }
@@ -157,7 +157,7 @@ void FuseRun::take(const StereoFrame& frame) {
   fuse(frame.stamp, &frame, {});
 }
 
-/// Depth images up to a frame's stamp; the one at the stamp gets the frame's grey values and labels.
+/// Takes depth images up to a frame's stamp; the one at the stamp gets the frame's grey values and labels.
 void FuseRun::takeSensorUntil(Stamp stamp, const StereoFrame* frame) {
   for (; next_depth_ < depth_.rows().size() && depth_.rows()[next_depth_].stamp <= stamp; ++next_depth_) {
     const Stamp at = depth_.rows()[next_depth_].stamp;
@@ -199,7 +199,7 @@ void FuseRun::fuse(Stamp stamp, const StereoFrame* frame, const DepthImageView& 
   times_.depth.add(depth_time.cpu);
   times_.volume.add(volume_time.cpu);
   const Eigen::Vector3d& vehicle = pose->T_world_body.translation;
-  // What is left over is counted in the report and drawn later.
+  // What is not drawn now is counted in the report and drawn later.
   times_.surface.add(measured([&] { static_cast<void>(map_->draw(vehicle, {}, report_)); }).cpu);
   times_.distance.add(measured([&] { map_->updateDistance(vehicle, {}, report_); }).cpu);
 }

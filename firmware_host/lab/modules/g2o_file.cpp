@@ -16,7 +16,7 @@
 namespace swiftlet {
 namespace {
 
-/// A line number as InputError counts them.
+/// A line number in InputError's type.
 int lineOf(const G2oMessage& message) {
   constexpr std::size_t kLargest = std::numeric_limits<int>::max();
   return static_cast<int>(std::min(message.line, kLargest));

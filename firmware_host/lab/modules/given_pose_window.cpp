@@ -10,18 +10,18 @@
 namespace swiftlet {
 namespace {
 
-// px: six sigma of the tracks' noise, and what a truth's own error of some milliradians makes.
+// px: six sigma of the tracks' noise, and the effect of some milliradians of error in the truth.
 constexpr double kMaxReprojection = 3.0;
-// Largest share of its sightings that a landmark may lose without being doubted as a whole.
+// A landmark may lose up to this share of its sightings before it is rejected as a whole.
 constexpr double kMaxShareLeftOut = 1.0 / 3.0;
-// Depth unknown to more than a third: within three sigma of infinity.
+// Depth uncertain by more than a third: within three sigma of infinity.
 constexpr double kMaxRelativeDepthSigma = 1.0 / 3.0;
-// px: where a landmark at a given pose may be seen, its own error and the poses' included.
+// px: search radius around a predicted landmark, including its own error and the poses'.
 constexpr float kGate = 8.0F;
-// As the smoother's: the newest keyframes behind the recent frames are never chosen to go.
+// As in the smoother: this many of the newest keyframes behind the recent frames are never removed.
 constexpr std::size_t kProtectedKeyframes = 5;
 
-/// Index of the bearing that misses the point by the largest angle.
+/// Index of the bearing with the largest angular error to the point.
 std::size_t worstSighting(const Eigen::Vector3d& point, const std::vector<Eigen::Vector3d>& bearings,
                           const std::vector<SE3>& poses) {
   std::size_t worst = 0;
@@ -215,7 +215,7 @@ void GivenPoseWindow::writeWindow() {
     landmark.changed = false;
     if (landmark.point.valid) valid.push_back(&entry);
   }
-  // As in the smoother: the landmark not seen for longest goes first.
+  // As in the smoother: the landmarks not seen for longest are removed first.
   if (valid.size() > kMaxLandmarks) {
     std::stable_sort(valid.begin(), valid.end(), [](const auto* a, const auto* b) {
       return a->second.last_frame > b->second.last_frame;

@@ -1,13 +1,13 @@
 #pragma once
-// The smoother's part where the poses are given: landmarks triangulated from tracks over a sliding window.
+// Replaces the smoother if poses are given: landmarks are triangulated from tracks over a sliding window.
 //
-// States stay by the smoother's rules: the newest four frames whole, then keyframes up to twelve in all; a
-// keyframe whose landmarks are out of sight goes first, else the one in the densest place
+// States are kept by the smoother's rules: the newest four frames, then keyframes, up to twelve in all. A
+// keyframe whose landmarks are out of sight is removed first, otherwise the one in the densest place
 // (estimator/smoother). A landmark is triangulated from all its sightings in the window, again whenever they
-// changed; the sighting that fits worst is left out while any misses by more than a few pixels, up to a third
-// of them. What is left must see it in front, and determine its depth to a third. Poses count as exact:
+// change. The worst sighting is removed while any is off by more than a few pixels, up to a third of them.
+// The remaining ones must see it in front and determine its depth to a third. Poses count as exact:
 // inverse_depth_sigma is that of the pixel noise alone. Frames: world of the given poses. Host side:
-// allocates; about 1 ms a frame of 300 features.
+// allocates; about 1 ms per frame of 300 features.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -24,32 +24,32 @@ namespace swiftlet {
 
 struct GivenPoseSettings {
   double pixel_sigma = kTrackPixelSigma;  ///< px
-  double horizon = 30.0;                  ///< s: no state older than this stays
+  double horizon = 30.0;                  ///< s: older states are removed
   int max_recent = 4;
   int max_keyframes = 12;
-  /// Sightings in keyframes are kept permanently, so that a landmark found again is known by all of them.
-  /// Memory grows with the flight.
+  /// Keep sightings in keyframes permanently, so that a landmark that is found again has all of them. Memory
+  /// grows with the flight.
   bool keep_sightings = false;
 };
 
-/// What became of triangulations, summed over all that were done.
+/// Outcomes of all triangulations.
 struct GivenPoseCounters {
   std::uint64_t triangulated = 0;
-  std::uint64_t sightings_left_out = 0;  ///< did not fit
+  std::uint64_t sightings_left_out = 0;  ///< removed because they did not fit
   std::uint64_t no_parallax = 0;
-  std::uint64_t no_fit = 0;  ///< behind, too near or far, or too many sightings that miss
+  std::uint64_t no_fit = 0;  ///< behind the camera, too near or far, or too many bad sightings
 };
 
 class GivenPoseWindow {
  public:
   GivenPoseWindow(const Rig& rig, const GivenPoseSettings& settings);
 
-  /// What the front-end may expect at this pose.
+  /// Predicts for the front-end at this pose.
   void predict(const SE3& T_world_body, FrontendPrediction& prediction) const;
-  /// Takes the frame in and makes room; window() is then that after this frame. Features with pixels that are
-  /// no numbers, or beyond the lens model, are left out.
+  /// Adds the frame and makes room; window() is then the window after this frame. Features with pixels that
+  /// are not finite or outside the lens model are omitted.
   void add(const TrackedFrame& tracked, const SE3& T_world_body);
-  /// The poses have jumped: forgets everything, the next window belongs to a new epoch.
+  /// The poses have jumped: forgets everything; the next window belongs to a new epoch.
   void startEpoch();
 
   /// `newest` holds stamp, epoch, pose and velocity.
@@ -59,7 +59,7 @@ class GivenPoseWindow {
  private:
   struct View {
     std::uint64_t frame_index = 0;
-    Eigen::Vector3d bearing;  ///< unit, camera frame
+    Eigen::Vector3d bearing;  ///< unit, in the camera frame
     SE3 T_world_cam;
   };
   struct Point {
@@ -73,7 +73,7 @@ class GivenPoseWindow {
     bool changed = true;
     Point point;
   };
-  using Landmarks = std::map<TrackId, Landmark>;  // by id: the same bytes every time
+  using Landmarks = std::map<TrackId, Landmark>;  // ordered by id: the same bytes every time
 
   void addViews(const TrackedFrame& tracked, const SE3& T_world_body);
   void trim();

@@ -11,11 +11,11 @@
 namespace swiftlet {
 namespace {
 
-// Faster than this no drone flies or turns that sees anything.
+// No drone moves or rotates faster while it can see.
 constexpr double kMaxSpeed = 20.0;     // m/s
 constexpr double kMaxTurnRate = 20.0;  // rad/s
-// What a pose may stand aside of its neighbour without being a jump: millimetres of noise between poses at
-// 1 kHz are metres a second.
+// Deviations of a pose from its neighbours up to this are no jump: at 1 kHz, millimetres of noise are metres
+// per second.
 constexpr double kFreeDistance = 0.05;  // m
 constexpr double kFreeAngle = 0.05;     // rad
 

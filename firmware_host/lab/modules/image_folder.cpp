@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Larger pictures are refused before memory is asked for them.
+// Larger images are refused before memory is allocated.
 constexpr int kMaxSide = 16384;  // px
 
 }  // namespace

@@ -1,5 +1,5 @@
 #pragma once
-// Folders of pictures of any size, without anything beside them.
+// Folders that contain only images, of any size.
 //
 // Host side: allocates, throws InputError.
 
@@ -12,16 +12,16 @@
 
 namespace swiftlet {
 
-/// All .png, .jpg and .jpeg under the folder, in the order of their names. InputError for a folder that
-/// cannot be read or holds none.
+/// All .png, .jpg and .jpeg files under the folder, ordered by name. InputError if the folder cannot be read
+/// or has none.
 std::vector<std::string> imagesUnder(const std::string& folder);
 
 /// One image of any size, decoded to 8-bit grey. Its memory is reused for the next.
 class ImageFile {
  public:
-  /// False for what cannot be decoded.
+  /// False if it cannot be decoded.
   bool read(const std::string& path);
-  /// Until the next read().
+  /// Valid until the next read().
   [[nodiscard]] ImageView view() const { return {pixels_.data(), size_.width, size_.height, size_.width}; }
 
  private:

@@ -23,8 +23,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::uint8_t kOccupied = 0, kFree = 254, kUnseen = 205, kNoPercent = 255;
-/// Between free (1 - 254 / 255) and unseen (1 - 205 / 255 = 0.1961), and between unseen and occupied (1):
-/// map_server's own defaults.
+/// Defaults of map_server: between free (1 - 254 / 255) and unseen (1 - 205 / 255 = 0.1961), and between
+/// unseen and occupied (1).
 constexpr double kFreeThreshold = 0.196, kOccupiedThreshold = 0.65;
 
 MapMesh meshOf(const VoxelVolume& volume, const ConfusionModel& confusion, double least_weight) {

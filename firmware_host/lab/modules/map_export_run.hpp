@@ -1,5 +1,5 @@
 #pragma once
-// A kept map in the formats of other tools: what `swiftlet map export` calls.
+// Writes a kept map in the formats of other tools: called by `swiftlet map export`.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,20 +11,20 @@
 namespace swiftlet {
 
 struct MapExportRequest {
-  std::string map;          ///< kept map: its folder, or its volume
+  std::string map;          ///< kept map: its folder or its volume
   std::string out;          ///< new folder
-  std::optional<double> z;  ///< m, of the slices; none: the middle of the map's height
+  std::optional<double> z;  ///< m, height of the slices; empty: the middle of the map's height
 };
 
-/// Grey values as ROS's map_server reads them with `mode: trinary`: surface 0, free 254, unknown and behind a
+/// Grey values as read by ROS's map_server with `mode: trinary`: surface 0, free 254, unknown and behind a
 /// surface 205.
 std::vector<std::uint8_t> occupancyPixels(const MapSlice& slice);
-/// With `mode: raw`: distances in percent of the reach, 100 where no surface is in reach, 0 on and behind
+/// For `mode: raw`: distances in percent of the reach, 100 if no surface is in reach, 0 on and behind
 /// surfaces; 255 unknown.
 std::vector<std::uint8_t> distancePixels(const MapSlice& slice);
 
-/// Writes surface.ply, surface.glb, voxels.ply, occupancy.png and distance.png with a .yaml each; gives the
-/// figures. InputError for bad input, with file, option and remedy; there is no folder then.
+/// Writes surface.ply, surface.glb, voxels.ply, occupancy.png and distance.png with a .yaml each, and returns
+/// the figures. InputError for bad input, with file, option and remedy; no folder is left then.
 nlohmann::ordered_json runMapExport(const MapExportRequest& request);
 
 }  // namespace swiftlet

@@ -43,12 +43,12 @@ void demand(const Status& status, const std::string& folder) {
   if (!status.ok()) throw InputError(folder, 0, "", status.what, "Choose another kept map");
 }
 
-/// Each block goes with the nodes of its own map to where they are now.
+/// Moves each block with the nodes of its own map to their new poses.
 void mergeVolumes(const MapMergeRequest& request, const LoopStage& stage,
                   const std::vector<std::uint32_t>& epochs, KeptFolder& out) {
   struct Part {
     std::string path;
-    std::size_t begin, end;  ///< nodes
+    std::size_t begin, end;  ///< indices of nodes
   };
   std::vector<Part> parts{{keptVolumeOf(request.first), 0, stage.keptCount()},
                           {keptVolumeOf(request.second), stage.keptCount(), stage.nodeCount()}};
@@ -100,7 +100,7 @@ Json runMapMerge(const MapMergeRequest& request) {
   const auto stage = std::make_unique<LoopStage>(rig, LoopSettings{}, limits);
   demand(stage->takeIn(first, KeptUse::kExtend), request.first);
   LoopEffort effort;
-  effort.candidates = kMaxLoopCandidates;  // there is time
+  effort.candidates = kMaxLoopCandidates;  // computing time is not limited here
   demand(stage->flyAgain(second, effort), request.second);
   KeptGraph merged;
   const std::vector<std::uint32_t> epochs = stage->keep(merged);

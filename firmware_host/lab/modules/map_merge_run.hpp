@@ -1,5 +1,5 @@
 #pragma once
-// Two kept maps made one, and what a kept map holds: what `swiftlet map merge` and `swiftlet map info` call.
+// Merges two kept maps, and describes a kept map: called by `swiftlet map merge` and `swiftlet map info`.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,12 +12,12 @@ struct MapMergeRequest {
   std::string out;     ///< new folder
 };
 
-/// The second map's nodes follow the first's as if they had been flown in it (LoopStage::flyAgain). Returns
-/// the summary. InputError, and nothing is written, where a folder is no sound map, `out` is there already,
-/// or loops do not tie the two.
+/// Adds the second map's nodes after the first's as if they had been flown in it (LoopStage::flyAgain).
+/// Returns the summary. InputError, and nothing is written, if a folder is not a valid map, `out` exists, or
+/// no loops tie the two.
 nlohmann::ordered_json runMapMerge(const MapMergeRequest& request);
 
-/// Of the graph, and of the volume where there is one.
+/// Describes the graph, and the volume if there is one.
 nlohmann::ordered_json mapInfo(const std::string& folder);
 
 }  // namespace swiftlet

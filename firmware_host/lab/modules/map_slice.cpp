@@ -12,10 +12,10 @@
 namespace swiftlet {
 namespace {
 
-constexpr int kTile = 128;  // voxels along a side of what is taken from one window
+constexpr int kTile = 128;  // side length in voxels of the part used from one window
 static_assert(kTile % kDistanceStep == 0);
 
-/// Voxels from `least` to before `most`.
+/// Voxels from `least` (included) to `most` (excluded).
 struct VoxelBox {
   Eigen::Vector3i least = Eigen::Vector3i::Constant(std::numeric_limits<int>::max());
   Eigen::Vector3i most = Eigen::Vector3i::Constant(std::numeric_limits<int>::min());
@@ -27,7 +27,7 @@ struct VoxelBox {
   [[nodiscard]] bool empty() const { return most.x() < least.x(); }
 };
 
-/// First voxels of the blocks that are known.
+/// First voxels of the known blocks.
 std::vector<Eigen::Vector3i> knownBlocks(const VoxelVolume& volume) {
   std::vector<Eigen::Vector3i> blocks;
   for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
@@ -38,7 +38,7 @@ std::vector<Eigen::Vector3i> knownBlocks(const VoxelVolume& volume) {
   return blocks;
 }
 
-/// A surface has voxels behind it.
+/// Whether the volume has a surface: voxels with negative distance.
 bool hasSurface(const VoxelVolume& volume) {
   for (std::uint32_t slot = 0; slot < volume.slots(); ++slot) {
     const BlockHeader& header = volume.header(slot);
@@ -66,10 +66,10 @@ int layerOf(const std::string& name, const VoxelBox& box, double voxel_size, std
 
 DistanceLimits windowLimits(double voxel_size) {
   DistanceLimits limits;
-  // From what is taken to the window's edge: the reach, and a block for the cells around a point and the
-  // steps of a query along the surface.
+  // Margin between the used part and the window's edge: the reach, and a block for the cells around a point
+  // and the steps of a query along the surface.
   const int margin = (limits.reach + 2 * kDistanceStep - 1) / kDistanceStep * kDistanceStep;
-  // The layer lies anywhere in a step of the window.
+  // The layer may be anywhere within a step of the window.
   limits.cells = {kTile + 2 * margin, kTile + 2 * margin, 2 * (margin + kDistanceStep)};
   limits.cell_size = voxel_size;
   return limits;
@@ -82,13 +82,13 @@ SliceKind kindOf(const DistanceSample& sample, bool surface) {
   return sample.kind == DistanceKind::kAtLeast ? SliceKind::kAtLeast : SliceKind::kDistance;
 }
 
-/// The pixels of the voxels from `first` on, kTile along x and y, in the slice whose box begins at `corner`.
+/// Draws the voxels from `first` on, kTile along x and y, into the slice whose box begins at `corner`.
 void drawTile(const VoxelVolume& volume, const Eigen::Vector3i& first, const Eigen::Vector3i& corner,
               MapSlice& slice) {
   DistanceField field(windowLimits(slice.voxel_size));
   const Eigen::Vector3i middle = first + Eigen::Vector3i(kTile / 2, kTile / 2, 0);
   const Eigen::Vector3d p = field.centreOf(middle);
-  // A window stays where it is for a short way: only when it comes from afar, it lies exactly around `p`.
+  // The window does not follow short moves: it is exactly around `p` only if it comes from far away.
   field.follow(field.centreOf(middle - field.limits().cells));
   field.follow(p);
   VolumeDistance distance(volume, field);
@@ -158,7 +158,7 @@ MapSlice sliceOf(const std::string& name, const VoxelVolume& volume, std::option
   slice.kind.assign(pixels, SliceKind::kUnknown);
   slice.distance.assign(pixels, std::numeric_limits<float>::quiet_NaN());
   const Eigen::Vector2i tiles = (size.array() + kTile - 1) / kTile;
-  // Tiles without a block are unknown.
+  // Tiles without blocks stay unknown.
   std::vector<bool> holds(static_cast<std::size_t>(tiles.prod()));
   for (const Eigen::Vector3i& block : blocks) {
     const Eigen::Vector3i tile = (block - box.least) / kTile;

@@ -21,7 +21,7 @@ using Colour = std::array<double, 3>;
 constexpr Colour kBlack{0, 0, 0}, kGrey{150, 150, 150}, kViolet{75, 35, 95}, kBlue{130, 175, 235};
 constexpr std::array<Colour, 4> kRamp{{{110, 10, 15}, {215, 85, 20}, {250, 180, 60}, {255, 252, 215}}};
 
-/// `part` from 0 to 1 along the ramp.
+/// Colour at `part` (0 to 1) of the ramp.
 Colour rampAt(double part) {
   const double at = std::clamp(part, 0.0, 1.0) * (kRamp.size() - 1);
   const std::size_t below = std::min(static_cast<std::size_t>(at), kRamp.size() - 2);
@@ -48,7 +48,7 @@ Colour colourOf(const MapSlice& slice, std::size_t pixel) {
   return kGrey;
 }
 
-/// Before the work, not after it.
+/// Checks the output before the work is done.
 void checkOutput(const MapSliceRequest& request, const std::string& path, const char* option) {
   std::error_code none;
   if (!fs::is_directory(fs::absolute(path).parent_path(), none) || fs::is_directory(path, none)) {
@@ -78,7 +78,7 @@ Json summaryOf(const MapSliceRequest& request, const MapSlice& slice, const std:
   return json;
 }
 
-/// Under other names first, so that a disk that is full leaves none of the files.
+/// Writes to temporary names first, so that a full disk leaves neither file.
 void write(const MapSliceRequest& request, const MapSlice& slice, const MapSliceResult& result) {
   const std::array<std::string, 2> files{request.out, result.millimetres};
   const std::array<std::string, 2> parts{files[0] + ".part", files[1] + ".part"};
@@ -110,7 +110,7 @@ std::vector<std::uint16_t> sliceMillimetres(const MapSlice& slice) {
   std::vector<std::uint16_t> millimetres(slice.kind.size());
   for (std::size_t i = 0; i < millimetres.size(); ++i) {
     const double distance = static_cast<double>(slice.distance[i]);
-    // False for what is not a number.
+    // False for NaN.
     if (distance > 0)
       millimetres[i] = static_cast<std::uint16_t>(std::clamp(std::round(1e3 * distance), 1.0, 65535.0));
   }

@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A flight of half an hour through new surroundings all the time: 100 new landmarks a second.
+// A flight of half an hour through new surroundings: 100 new landmarks per second.
 constexpr std::size_t kCompleteVertices = 200'000;
 
 HorizonLimits completeLimits() { return {kCompleteVertices, 2 * kCompleteVertices, true}; }
@@ -33,7 +33,7 @@ GivenPoseSettings windowSettings(const Settings& settings, bool complete) {
   return window;
 }
 
-/// Landmarks by the given poses, and the meshes of them.
+/// Landmarks from the given poses, and their meshes.
 struct Mesher {
   Mesher(const Rig& rig, const GivenPoseSettings& settings, const HorizonLimits& limits,
          const MeshPlanes& planes)
@@ -41,8 +41,8 @@ struct Mesher {
 
   GivenPoseWindow window;
   std::unique_ptr<MeshStage> stage;
-  LatencyHistogram frame_times;     ///< CPU s of a step
-  LatencyHistogram keyframe_times;  ///< likewise, at keyframes
+  LatencyHistogram frame_times;     ///< CPU time of a step [s]
+  LatencyHistogram keyframe_times;  ///< CPU time of a step at keyframes [s]
 };
 
 TriangleMesh toTriangleMesh(const HorizonMesh& mesh) {
@@ -78,7 +78,7 @@ MeshRequest inUse(MeshRequest request, const Settings& settings) {
   return request;
 }
 
-/// What one run is made of, from opening to the summary.
+/// The parts of one run, from opening to the summary.
 class MeshRun {
  public:
   MeshRun(const MeshRequest& request, const Settings& settings)
@@ -95,7 +95,7 @@ class MeshRun {
   }
 
  private:
-  /// Files that come into being with the first frame that has a pose.
+  /// Files that are created with the first frame that has a pose.
   struct Output {
     explicit Output(const std::filesystem::path& folder)
         : claim(folder.string(), RunKind::kMesh, false),
@@ -169,7 +169,7 @@ void MeshRun::take(const StereoFrame& frame) {
   mesh(tracked_, *pose, frame.image[0]);
 }
 
-/// What was tracked before a jump has no place in the poses after it.
+/// Tracks from before a jump do not fit the poses after it.
 void MeshRun::noteJump(std::size_t piece) {
   if (meshed_ > 0 && piece != piece_) {
     ++jumps_;
@@ -205,7 +205,7 @@ void MeshRun::step(Mesher& mesher, const TrackedFrame& tracked, const SE3& T_wor
   MeshInput input = views;
   input.window = &mesher.window.window();
   input.tracks = &tracked;
-  // Refusals are in the stage's counters; the meshes are then as they were.
+  // Refusals are counted by the stage; its meshes are then unchanged.
   const Spent spent = measured([&] { static_cast<void>(mesher.stage->step(input)); });
   (tracked.keyframe ? mesher.keyframe_times : mesher.frame_times).add(spent.cpu);
 }

@@ -1,9 +1,9 @@
 #pragma once
-// The mesher alone on a log, with given poses: what `swiftlet mesh` and the tests on it call.
+// Runs only the mesher on a log with given poses: called by `swiftlet mesh` and its tests.
 //
 // Images are paired and tracked as in flight (the front-end predicts from the given poses), landmarks are
-// triangulated with the given poses (GivenPoseWindow), and MeshStage steps once a frame. Frames without a
-// pose are skipped and counted; where the trajectory jumps a new epoch begins, and with it a new mesh.
+// triangulated with the given poses (GivenPoseWindow), and MeshStage runs once per frame. Frames without a
+// pose are skipped and counted. Where the trajectory jumps, a new epoch with a new mesh begins.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -20,7 +20,7 @@ struct MeshRequest : PosedLogRequest {
 struct MeshRunResult {
   nlohmann::ordered_json summary;  ///< as written to summary.json
   bool finished = true;            ///< false: stopped
-  bool has_mesh = false;           ///< some frame had a face
+  bool has_mesh = false;           ///< at least one frame had a face
 };
 
 /// Writes meshes/, local_mesh.ply, trajectory.tum (the poses used), summary.json and, on request,

@@ -1,5 +1,5 @@
 #pragma once
-// A plain folder of pictures as the images of a trajectory. Host side: allocates, throws InputError.
+// Uses a plain folder of images together with a trajectory. Host side: allocates, throws InputError.
 
 #include <string>
 #include <vector>
@@ -15,15 +15,15 @@ struct PlaceImage {
   Stamp stamp;
 };
 
-/// A folder that is no log and has pictures directly in it.
+/// Whether the folder is not a log and directly contains images.
 bool isPlainImageFolder(const std::string& path);
 
-/// In the order of time. Names that are numbers are stamps: nanoseconds, or seconds where they have a point.
-/// Where a name is none, or no stamp lies within the trajectory, each picture takes the stamp of one pose, in
-/// order; InputError if there are not as many of both.
+/// In the order of time. Names that are numbers are stamps: nanoseconds, or seconds if they have a decimal
+/// point. If a name is not a number, or no stamp is within the trajectory, each image gets the stamp of one
+/// pose, in order; InputError if their numbers differ.
 std::vector<PlaceImage> stampedImages(const std::string& folder, const Trajectory& trajectory);
 
-/// One camera without distortion: bearings that nothing is computed from.
+/// A camera without distortion; its bearings are not used.
 Rig pictureRig(ImageSize size);
 
 }  // namespace swiftlet

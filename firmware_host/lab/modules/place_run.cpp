@@ -38,7 +38,7 @@ Vocabulary vocabularyOf(const PlaceRequest& request, const Settings& settings) {
   return file.empty() ? Vocabulary::shipped() : readVocabulary(file);
 }
 
-/// What the stages need beside an image, made when its size is known.
+/// The stages and their data, created when the image size is known.
 struct Stages {
   Stages(const Rig& rig, const Vocabulary& vocabulary, const PlaceDatabaseSettings& database, bool verify)
       : place(rig.camera[0], vocabulary, {}, database), kept(place.database().capacity()) {
@@ -52,7 +52,7 @@ struct Stages {
     SE3 T_world_body;
   };
   PlaceStage place;
-  std::vector<Kept> kept;  ///< by the database's slots
+  std::vector<Kept> kept;  ///< indexed by the database's slots
   std::unique_ptr<StereoDepth> depth;
   std::unique_ptr<LoopVerifier> verifier;  ///< null: retrieval only
   PlaceStep step;
@@ -165,7 +165,7 @@ void PlaceRun::runLog() {
   warnings_ = log.warningsJson();
 }
 
-/// `all`: whether it has moved or not.
+/// `all`: also take the image if it has not moved.
 void PlaceRun::take(const StereoFrame& frame, const Rig& rig, bool all) {
   if (images_++ == 0) first_image_ = frame.stamp;
   last_image_ = frame.stamp;
@@ -209,7 +209,7 @@ void PlaceRun::see(const StereoFrame& frame, const GivenPoses::Pose& pose, const
     return;
   }
   std::size_t found = 0;
-  // A pair whose other image is missing has no depths: candidates then fail for want of them.
+  // A pair with a missing image has no depths, so its candidates cannot be verified.
   if (s.depth && !frame.image[1].empty()) {
     static_cast<void>(s.depth->fill(frame.image[0], frame.image[1], s.keyframe, found));
   }

@@ -1,14 +1,14 @@
 #pragma once
-// Place recognition alone, on images with given poses: what `swiftlet place` and the tests on it call.
+// Runs only place recognition on images with given poses: called by `swiftlet place` and its tests.
 //
 // Two kinds of input. A log (openLog) gives calibration, stamps and, with two cameras, depths: candidates are
-// verified by geometry. A plain folder of pictures gives neither: candidates only. Its pictures have the
-// poses of the trajectory that stand at the stamps in their names (nanoseconds, or seconds with a point), or,
-// where the names are no stamps, one pose each in the order of the names.
+// verified geometrically. A plain folder of images gives neither: candidates only. Its images have the
+// trajectory's poses at the stamps in their names (nanoseconds, or seconds with a decimal point), or, if the
+// names are not stamps, one pose each in the order of the names.
 //
-// An image becomes a keyframe where it has moved or turned enough by the given poses; a plain folder is taken
-// whole. Each is described, asked about, verified and stored, in the order of time. Where the poses jump a
-// new epoch begins: its world is another, so that pairs across are not judged. Host side.
+// An image becomes a keyframe if it has moved or rotated enough by the given poses; all images of a plain
+// folder are taken. Each is described, queried, verified and stored, in the order of time. Where the poses
+// jump, a new epoch begins: it has another world, so pairs across are not judged. Host side.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -20,13 +20,13 @@ namespace swiftlet {
 /// `log` may be a plain folder of images.
 struct PlaceRequest : PosedLogRequest {
   std::string out;               ///< folder to write
-  std::string vocabulary;        ///< file; empty: the settings', else the shipped one
-  int candidates = 10;           ///< of an image, at most
-  double exclude = 10;           ///< s: images nearer in time are no revisit
-  double min_distance = 0.25;    ///< m: a log's image is a keyframe when it has moved by this,
-  double min_turn_deg = 11.5;    ///< turned by this
+  std::string vocabulary;        ///< file; empty: the settings' one, else the shipped one
+  int candidates = 10;           ///< most per image
+  double exclude = 10;           ///< s: images closer in time are no revisit
+  double min_distance = 0.25;    ///< m: an image of a log becomes a keyframe if it has moved by this,
+  double min_turn_deg = 11.5;    ///< rotated by this,
   double min_seconds = 2;        ///< or when this much time has passed since the last one
-  std::size_t keyframes = 2000;  ///< that are remembered at most
+  std::size_t keyframes = 2000;  ///< most keyframes remembered
 };
 
 struct PlaceRunResult {
@@ -34,7 +34,7 @@ struct PlaceRunResult {
   bool finished = true;            ///< false: stopped
 };
 
-/// Writes places.csv (one row for each candidate: what retrieval, geometry and the poses say of it) and
+/// Writes places.csv (one row per candidate with the results of retrieval, geometry and poses) and
 /// summary.json. InputError for bad input; nothing is written before the first image that has a pose.
 PlaceRunResult runPlace(const PlaceRequest& request, const Settings& settings);
 

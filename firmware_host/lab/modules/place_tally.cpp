@@ -34,7 +34,7 @@ bool isRight(const PoseDistance& error) {
   return error.metres <= kFalseLoopDistance && error.degrees <= kFalseLoopDegrees;
 }
 
-/// Null where there is nothing to take a share of.
+/// Null if `all` is 0.
 Json share(std::uint64_t part, std::uint64_t all) {
   return all == 0 ? Json(nullptr) : Json(static_cast<double>(part) / static_cast<double>(all));
 }

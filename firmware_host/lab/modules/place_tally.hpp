@@ -1,9 +1,9 @@
 #pragma once
-// What `swiftlet place` counts: candidates and loops against the given poses, and the time they took.
+// Counts for `swiftlet place`: candidates and loops compared with the given poses, and their computing time.
 //
-// By the poses two images show the same place when they stand within 1 m and 30 degrees of each other (the
-// measure of evaluation/revisits.hpp): a wall may still be between them, and what is seen from farther off
-// counts neither way. A verified pose is false when it is further from theirs than
+// According to the poses, two images show the same place if they are within 1 m and 30 degrees of each other
+// (the measure of evaluation/revisits.hpp). There may still be a wall between them, and images farther apart
+// that see the same place count neither way. A verified pose is false if it deviates by more than
 // evaluation/loop_accuracy.hpp allows.
 
 #include <nlohmann/json.hpp>
@@ -18,7 +18,7 @@ namespace swiftlet {
 /// Header line of places.csv.
 std::string placeColumns();
 
-/// The columns of geometry, the separating comma first. `truth`: T_old_new by the poses, where `judged`.
+/// The columns of geometry, starting with a comma. `truth`: T_old_new from the poses, if `judged`.
 std::string verificationText(const LoopVerification& result, const SE3& truth, bool judged);
 
 class PlaceTally {
@@ -26,12 +26,12 @@ class PlaceTally {
   void begin(Stamp stamp, std::uint32_t epoch, const SE3& T_world_body);
   void addCandidate(const SE3& truth, bool judged);
   void addVerification(const LoopVerification& result, const SE3& truth, bool judged);
-  /// `exclude` [s]: nearer images are no revisit.
+  /// `exclude` [s]: images closer in time are no revisit.
   void end(double exclude);
   void write(nlohmann::ordered_json& summary) const;
 
   LatencyHistogram recognition;   ///< CPU s: features, words, query, storing
-  LatencyHistogram verification;  ///< CPU s of a candidate
+  LatencyHistogram verification;  ///< CPU s per candidate
 
  private:
   struct Image {
@@ -42,13 +42,13 @@ class PlaceTally {
   [[nodiscard]] bool revisits(double exclude) const;
 
   std::vector<Image> images_;
-  bool proposed_ = false;  ///< for the image in hand a candidate shows its place
-  bool closed_ = false;    ///< and one was verified rightly
+  bool proposed_ = false;  ///< a candidate shows the place of the current image
+  bool closed_ = false;    ///< and one of these was verified correctly
   std::uint64_t revisiting_ = 0, revisiting_proposed_ = 0, revisiting_closed_ = 0;
   std::uint64_t candidates_ = 0, judged_candidates_ = 0, near_candidates_ = 0;
   std::uint64_t accepted_ = 0, judged_ = 0, right_ = 0;
   std::array<std::uint64_t, kLoopFates> fates_{};
-  std::vector<double> metres_, degrees_;  ///< of the right ones
+  std::vector<double> metres_, degrees_;  ///< of the correct loops
 };
 
 }  // namespace swiftlet

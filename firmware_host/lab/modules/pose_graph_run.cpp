@@ -55,7 +55,7 @@ void writeLoops(const PoseGraphRequest& request, const std::vector<std::int64_t>
   writeWholeFile(request.loops, csv.str());
 }
 
-/// Rejected loops leave the graph.
+/// Solves without the rejected loops.
 template <typename Pose>
 Status solveWithoutFalse(const PoseGraphRequest& request, const G2oGraph& file, std::size_t own_edges,
                          PoseGraph<Pose>& graph, PoseGraphResult& result) {
@@ -152,7 +152,7 @@ nlohmann::ordered_json toJson(const PoseGraphRequest& request, const PoseGraphRe
   auto& start = json["start"];
   start["choice"] = result.start.choice == StartChoice::kChordal ? "chordal" : "given";
   start["given_cost"] = result.start.given_cost;
-  // JSON has no infinity: not computed, or not to be had.
+  // JSON has no infinity: null if it was not computed or is not available.
   const bool chordal = request.start == StartRule::kAuto && std::isfinite(result.start.chordal_cost);
   start["chordal_cost"] = chordal ? nlohmann::ordered_json(result.start.chordal_cost) : nullptr;
   json["initial_cost"] = result.solve.initial_cost;

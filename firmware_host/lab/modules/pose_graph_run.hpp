@@ -1,5 +1,5 @@
 #pragma once
-// `swiftlet pose-graph`: a g2o file optimized, and written again with the poses found; on request without its
+// `swiftlet pose-graph`: optimizes a g2o file and writes it with the resulting poses, on request without its
 // false loops (mapping/pose_graph/robust_solution.hpp).
 
 #include <array>
@@ -24,10 +24,10 @@ struct PoseGraphRequest {
   std::uint32_t outliers = 0;  ///< false loops to add before solving
   std::uint64_t seed = 1;
   bool robust = false;
-  std::string loops;  ///< with `robust`: CSV of all loops and what became of them; empty: not written
+  std::string loops;  ///< with `robust`: CSV of all loops with their verdicts; empty: not written
 };
 
-/// What became of the loops of a graph: how many of each verdict.
+/// Number of loops with each verdict.
 struct LoopCount {
   std::array<std::uint32_t, kLoopVerdicts> counts{};
 
@@ -43,23 +43,23 @@ struct LoopCount {
 struct PoseGraphResult {
   bool planar = true;
   std::size_t poses = 0;
-  std::size_t edges = 0;  ///< with the false loops, before any is rejected
+  std::size_t edges = 0;  ///< including the false loops, before any is rejected
   std::uint32_t pieces = 0;
   std::uint32_t outliers = 0;
   RobustSolution robust;  ///< with `robust`
   LoopCount loops;        ///< of the file
   LoopCount false_loops;  ///< injected
   StartReport start;
-  OptimizeReport solve;      ///< initial_cost: at the start that was chosen
+  OptimizeReport solve;      ///< initial_cost: at the chosen start
   double seconds = 0;        ///< wall time of start and optimization, without files
   bool factored = true;      ///< false: the normal equations could not be factored
-  const char* failure = "";  ///< what then
+  const char* failure = "";  ///< the reason in that case
   std::vector<std::string> warnings;
 };
 
-/// InputError for bad input. Robust: `out` gets the graph without the rejected loops; where there is no
-/// solution (`factored` false) it gets the graph as it was. Deterministic but for `seconds`: the same file
-/// and request, the same output file.
+/// InputError for bad input. With `robust`, `out` receives the graph without the rejected loops; if there is
+/// no solution (`factored` false), the unchanged graph. Deterministic except for `seconds`: equal file and
+/// request give an equal output file.
 PoseGraphResult runPoseGraph(const PoseGraphRequest& request);
 
 nlohmann::ordered_json toJson(const PoseGraphRequest& request, const PoseGraphResult& result);

@@ -1,6 +1,5 @@
 #pragma once
-// A log beside poses that something else gave of it: what the modules run alone on. Images are paired as in
-// flight.
+// A log with poses from another source, for running single modules. Images are paired as in flight.
 
 #include <functional>
 #include <memory>
@@ -16,18 +15,18 @@ namespace swiftlet {
 
 struct PosedLogRequest : LogRequest {
   std::string trajectory;  ///< TUM, EuRoC csv; empty: the log's own truth
-  double max_gap = 0.1;    ///< s between poses, to interpolate
+  double max_gap = 0.1;    ///< s, longest gap between poses to interpolate
 };
 
 class PosedLog {
  public:
-  /// InputError if the log or the poses cannot be read, or a log has neither truth nor a trajectory.
+  /// InputError if the log or the poses cannot be read, or if there are neither truth nor a trajectory.
   PosedLog(const PosedLogRequest& request, const Settings& settings);
 
   [[nodiscard]] LogSource& source() { return *source_; }
   [[nodiscard]] const Rig& rig() const { return source_->rig(); }
   [[nodiscard]] const GivenPoses& poses() const { return poses_; }
-  /// What comes up beside those of the log itself.
+  /// Warnings in addition to those of the log itself.
   LogWarnings& warnings() { return warnings_; }
   [[nodiscard]] bool hasTracks() const { return !source_->trackFile().empty(); }
 
@@ -35,16 +34,16 @@ class PosedLog {
     std::function<void(const StereoFrame&)> frame;
     std::function<void(const TrackedFrame&)> tracks;  ///< empty: a log of tracks has no frames
   };
-  /// Says the warnings on stderr, then gives every frame of the section in order, with progress under the
+  /// Prints the warnings on stderr, then passes every frame of the section in order, with progress under the
   /// name `what`. False: stopped before the end.
   bool run(const char* what, const Handlers& handlers);
 
-  /// Of the frames given.
+  /// Stamps of the frames passed.
   [[nodiscard]] std::optional<Stamp> first() const { return first_; }
   [[nodiscard]] std::optional<Stamp> last() const { return last_; }
-  /// No `what` had a pose (`any`: there were some).
+  /// Fails because no `what` had a pose; `any`: whether there were any.
   [[noreturn]] void failWithoutPose(const char* what, bool any) const;
-  /// The log's, and the others.
+  /// All warnings, including the log's.
   [[nodiscard]] nlohmann::ordered_json warningsJson() const;
 
  private:

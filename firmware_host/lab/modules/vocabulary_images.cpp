@@ -34,7 +34,7 @@ TrainingImages describeImages(const std::vector<std::string>& folders, int every
     const ImageView view = image.view();
     if (!extractor || camera.width() != view.width || camera.height() != view.height) {
       extractor = std::make_unique<PlaceExtractor>(view.width, view.height, settings);
-      // Bearings are not used: any camera without distortion does.
+      // Bearings are not used, so any camera without distortion will do.
       camera = CameraModel(CameraKind::kPinholeRadtan, view.width, view.height,
                            Eigen::Vector4d(view.width, view.width, 0.5 * view.width, 0.5 * view.height),
                            Eigen::Vector4d::Zero());

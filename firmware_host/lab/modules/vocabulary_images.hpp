@@ -1,5 +1,5 @@
 #pragma once
-// The descriptors of image files, to train a vocabulary from.
+// Descriptors of image files, for training a vocabulary.
 //
 // Host side: allocates, throws InputError.
 
@@ -13,12 +13,12 @@ namespace swiftlet {
 
 struct TrainingImages {
   std::vector<Descriptor> descriptors;
-  std::vector<std::size_t> ends;  ///< one past each image's last
+  std::vector<std::size_t> ends;  ///< index after each image's last descriptor
 };
 
-/// All .png, .jpg and .jpeg under the folders, every `every`-th of each folder in the order of their names.
-/// InputError for a folder that cannot be read or holds none; images that cannot be decoded are named on
-/// stderr and left out.
+/// All .png, .jpg and .jpeg files under the folders, every `every`-th of each folder in the order of their
+/// names. InputError if a folder cannot be read or has none. Images that cannot be decoded are named on
+/// stderr and skipped.
 TrainingImages describeImages(const std::vector<std::string>& folders, int every, int features);
 
 }  // namespace swiftlet
