@@ -45,7 +45,7 @@ class RunPlayer::Work {
 
   ViewHub hub_;
   const std::string page_;
-  std::mutex mutex_;  ///< between threads that answer
+  std::mutex mutex_;  ///< shared by the answering threads
   const std::unique_ptr<RunMoments> moments_;
   std::optional<ViewServer> server_;
 };

@@ -1,9 +1,9 @@
 #pragma once
-// A finished run on the report's page, with the images of its log moment by moment (docs/report.md):
+// Shows a finished run on the report's page, with the images of its log moment by moment (docs/report.md):
 // `swiftlet view`.
 //
-// The page has its whole document from the start; GET /moment?i=N is one of RunMoments' messages. Requests
-// are answered one after the other, in the view server's threads and bounds.
+// The page has its whole document from the start; GET /moment?i=N returns one of RunMoments' messages.
+// Requests are answered one after the other, in the view server's threads and within its limits.
 
 #include <memory>
 #include <string>
@@ -16,10 +16,10 @@ namespace swiftlet {
 
 class RunPlayer {
  public:
-  /// Of pictures of a moment.
+  /// Size limits of a moment's pictures.
   static constexpr PictureBounds kPictures = {800, std::size_t{400} * 1024};
 
-  /// Listens from now on. InputError where the address cannot be had, or the installation has no page.
+  /// Starts listening. InputError if the address is not available, or if the page is not installed.
   RunPlayer(ReportedRun run, std::unique_ptr<RunMoments> moments, const ViewAddress& address);
   ~RunPlayer();
   RunPlayer(const RunPlayer&) = delete;

@@ -1,8 +1,8 @@
 #pragma once
-// What a run folder keeps of single images: the features of keyframes and the matches of loops
-// (keyframes.swk), the meshes of frames (meshes/). Files that a run does not have are no fault.
+// Data of single images in a run folder: features of keyframes and matches of loops (keyframes.swk), meshes
+// of frames (meshes/). Missing files are not an error.
 //
-// Memory: 28 bytes a feature; meshes are read when they are asked for.
+// Memory: 28 bytes per feature; meshes are read on request.
 
 #include <array>
 #include <optional>
@@ -21,24 +21,24 @@ namespace swiftlet {
 
 struct KeptKeyframe {
   Stamp stamp;                           ///< of its image
-  std::vector<TrackedFeature> features;  ///< by rising id
+  std::vector<TrackedFeature> features;  ///< ordered by id
 };
 
 struct KeptFrames {
-  std::optional<Rig> rig;  ///< of the keyframes; empty: no keyframes.swk
+  std::optional<Rig> rig;  ///< of the keyframes; empty without keyframes.swk
   std::vector<KeptKeyframe> keyframes;
   std::vector<LoopRevisit> loops;
   std::vector<MeshFrame> meshes;
 
-  /// Null where the image was no keyframe.
+  /// Null if the image was not a keyframe.
   [[nodiscard]] const KeptKeyframe* keyframeAt(Stamp stamp) const;
-  /// Of a loop closure found at this image; null: none.
+  /// The loop found at this image; null: none.
   [[nodiscard]] const LoopRevisit* loopAt(Stamp stamp) const;
-  /// The mesh of this image; empty: none was written. InputError where it is damaged.
+  /// The mesh of this image; empty: none was written. InputError if it is damaged.
   [[nodiscard]] std::optional<TriangleMesh> meshAt(Stamp stamp) const;
 };
 
-/// What is damaged is noted in `missing`, and the rest taken.
+/// Damaged files are noted in `missing`; the rest is read.
 KeptFrames readKeptFrames(const std::string& run_folder, std::vector<MissingFile>& missing);
 
 }  // namespace swiftlet

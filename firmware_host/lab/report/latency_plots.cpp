@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// "from_ms count, from_ms count" of summary.json; what is not of that form ends the series.
+/// Parses "from_ms count, from_ms count" of summary.json; the series ends at the first malformed entry.
 Series histogramSeries(const std::string& name, const std::string& text) {
   Series series{name, SeriesStyle::kLine, {}, {}, {}};
   std::istringstream columns(text);
@@ -56,12 +56,12 @@ Plot latencyPlot(const RunView& view, const std::string& stage, const Json& kind
 
 std::vector<std::pair<std::string, double>> budgetsOf(const RunView& view, const std::string& stage,
                                                       const std::string& time) {
-  // The settings name the two ways of a sample by what they are, the timing by the stage.
+  // The settings name the two budgets of a sample by their meaning, the timing by its stage.
   std::string name = stage;
   if (stage == "imu") name = time == "cpu" ? "propagate" : "sample_to_state";
   if (time == "wall") name += "_wall";
   std::vector<std::pair<std::string, double>> budgets;
-  // What waits for what is told by a run on threads only.
+  // Waiting times exist only in threaded runs.
   if (time == "wall" && view.files.text("executor/kind") == "lockstep") return budgets;
   const Json& settings = view.files.at("settings");
   if (!settings.is_object()) return budgets;

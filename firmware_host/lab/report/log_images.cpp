@@ -11,7 +11,7 @@
 namespace swiftlet {
 namespace {
 
-// Images enter a recording after samples that are newer than they are: by exposure, transfer and decoding.
+// In a recording, images come after newer samples, because of exposure, transfer and decoding.
 constexpr Duration kMostDelay = Duration::fromSeconds(5);
 
 }  // namespace
@@ -24,7 +24,7 @@ LogImages::LogImages(const std::string& log, bool mono, Stamp first, Stamp last)
   try {
     log_ = openLog(log, options);
   } catch (const InputError&) {
-    // A bag has no calibration of its own, and others may lack it: images need none.
+    // A bag has no calibration, and other logs may lack it; showing images needs none.
     options.uncalibrated = true;
     calibrated_ = false;
     log_ = openLog(log, options);
@@ -65,7 +65,7 @@ ImageView LogImages::at(Stamp stamp, std::size_t camera) {
       if (std::get<ImuSample>(message).stamp > stamp + kMostDelay) break;
     }
   } catch (const InputError&) {
-    // Damaged since it was listed: the others are still to be seen.
+    // Damaged since it was listed; the other images can still be shown.
   }
   return {};
 }

@@ -44,7 +44,7 @@ const char* colourOf(const Series& series, std::size_t i) {
   return kColours[i % kColours.size()];
 }
 
-/// From the plot's units to the drawing's.
+/// Converts the plot's units to the drawing's.
 class Frame {
  public:
   explicit Frame(const Plot& plot) : logarithmic_(plot.kind == PlotKind::kHistogram) {

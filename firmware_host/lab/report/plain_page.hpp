@@ -1,5 +1,5 @@
 #pragma once
-// The report where the page's program is missing: tables, and plots as SVG.
+// The report without the page's program: tables, and plots as SVG.
 
 #include <string>
 #include <vector>
@@ -14,11 +14,11 @@ std::string plainPage(const std::vector<ReportedRun>& runs);
 
 /// An HTML file around its content: title, style, version.
 std::string htmlDocument(const std::string& title, const std::string& content);
-/// The same with a remark that the full report is missing.
+/// The same with a note that the full report is missing.
 std::string plainDocument(const std::string& title, const std::string& content);
 std::string tableHtml(const Table& table);
 
-/// The plot as an SVG element: axes, lines and what they are called.
+/// The plot as an SVG element: axes, lines and labels.
 std::string svgPlot(const Plot& plot);
 
 }  // namespace swiftlet

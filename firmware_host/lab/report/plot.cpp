@@ -63,7 +63,7 @@ Series decimated(const Series& series, std::size_t most) {
   };
   keep(0);
   for (std::size_t part = 0; part < parts; ++part) {
-    // Of what lies between the first and the last point.
+    // Excluding the first and the last point.
     const std::size_t begin = 1 + part * (count - 2) / parts;
     const std::size_t end = 1 + (part + 1) * (count - 2) / parts;
     std::size_t low = begin;

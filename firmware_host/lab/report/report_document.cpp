@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Spans of one health, from the summary; where there is none, from the events.
+/// Spans of equal health, from the summary or else from the events.
 Json healthJson(const RunView& view) {
   const RunFiles& files = view.files;
   Json spans = Json::array();

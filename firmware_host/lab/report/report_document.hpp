@@ -1,5 +1,5 @@
 #pragma once
-// The report's one document (docs/report.md): all that the page shows, of one run or of two.
+// The report's document (docs/report.md): everything that the page shows of one or two runs.
 
 #include <map>
 #include <nlohmann/json.hpp>
@@ -10,18 +10,18 @@
 
 namespace swiftlet {
 
-/// A run and what is known of the world it flew through.
+/// A run and what is known about its surroundings.
 struct ReportedRun {
   RunView view;
   std::string true_surface;           ///< PLY file in the truth's axes; empty: none
   std::map<int, std::string> labels;  ///< names of the map's labels; may be empty
-  nlohmann::ordered_json moments;     ///< as servedMoments() or embeddedMoments() makes them; null: none
+  nlohmann::ordered_json moments;     ///< from servedMoments() or embeddedMoments(); null: none
 };
 
 /// One run of the document. A surface that cannot be read is noted as missing.
 nlohmann::ordered_json runDocument(const ReportedRun& run);
 
-/// {"format", "program", "runs", "differences"}; differences are named where there are two runs.
+/// {"format", "program", "runs", "differences"}; differences only for two runs.
 nlohmann::ordered_json reportDocument(const std::vector<ReportedRun>& runs);
 
 }  // namespace swiftlet

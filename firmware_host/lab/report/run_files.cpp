@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// Reads the files of one folder and notes what went wrong.
+/// Reads the files of one folder and notes errors.
 class FolderReader {
  public:
   explicit FolderReader(RunFiles& files) : files_(&files), folder_(files.folder) {}
@@ -23,7 +23,7 @@ class FolderReader {
 
   void note(const char* name, const std::string& what) { files_->missing.push_back({name, what}); }
 
-  /// `wanted`: what the report lacks without the file; null: not every run has one.
+  /// `wanted`: what the report lacks without the file; null: the file is optional.
   template <typename Value, typename Read>
   void read(const char* name, const char* wanted, Value& value, const Read& reader) {
     if (!has(name)) {
@@ -69,7 +69,7 @@ Json readJsonObject(const std::string& path) {
   return json;
 }
 
-/// The flight's first and last stamp: as the summary says, or as the files have them.
+/// Finds the flight's first and last stamp, from the summary or else from the files.
 void findBounds(RunFiles& files) {
   std::vector<Stamp> stamps;
   for (const Trajectory* poses : {&files.odometry, &files.map}) {
@@ -121,7 +121,7 @@ RunFiles readRunFiles(const std::string& folder) {
   if (!path.has_filename()) path = path.parent_path();
   files.name = fs::weakly_canonical(path).filename().string();
   FolderReader reader(files);
-  // A folder of `mesh` or `fuse` has the poses it was given, and neither odometry nor states.
+  // A folder of `mesh` or `fuse` has the given poses, and neither odometry nor states.
   const bool given = !reader.has("odometry.tum") && reader.has("trajectory.tum");
   const char* poses = given ? "trajectory.tum" : "odometry.tum";
   const auto trajectory = [&](const char* name) {

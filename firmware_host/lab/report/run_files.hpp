@@ -1,6 +1,5 @@
 #pragma once
-// What a run folder holds, read as far as it can be: a file that is missing or damaged is a line of text and
-// not a failure.
+// Reads as much of a run folder as possible: a missing or damaged file is noted as text and is not a failure.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,18 +14,18 @@
 
 namespace swiftlet {
 
-/// A file that should be there, or that could not be read as it is.
+/// A file that is missing or could not be read.
 struct MissingFile {
   std::string file;
-  std::string what;  ///< and what to do
+  std::string what;  ///< the problem and what to do
 };
 
 struct RunFiles {
   std::string folder;
-  std::string name;  ///< the folder's own
+  std::string name;  ///< name of the folder
   Stamp first_image;
   Stamp last_image;
-  Trajectory odometry;  ///< of `swiftlet mesh` and `fuse`: the poses used
+  Trajectory odometry;  ///< for `swiftlet mesh` and `fuse`: the poses used
   Trajectory imu_rate;  ///< empty without imu_rate.tum
   Trajectory map;
   std::vector<StoredState> states;
@@ -39,14 +38,14 @@ struct RunFiles {
 
   /// Seconds since the first image.
   [[nodiscard]] double seconds(Stamp stamp) const { return (stamp - first_image).seconds(); }
-  /// The object or value at a path of the summary ("run/log"); null when there is none.
+  /// The object or value at a path of the summary ("run/log"); null if it is missing.
   [[nodiscard]] const nlohmann::ordered_json& at(const std::string& path) const;
-  /// Text or number at a path of the summary; the default when it is missing or of another kind.
+  /// Text or number at a path of the summary; empty if it is missing or of another type.
   [[nodiscard]] std::string text(const std::string& path) const;
   [[nodiscard]] std::optional<double> number(const std::string& path) const;
 };
 
-/// InputError when there is no such folder, or nothing of a run in it.
+/// InputError if there is no such folder, or if it has no files of a run.
 RunFiles readRunFiles(const std::string& folder);
 
 }  // namespace swiftlet

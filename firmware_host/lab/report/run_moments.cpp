@@ -15,12 +15,13 @@
 namespace swiftlet {
 namespace {
 
-// Stamps of one image in different files: text of seconds keeps nanoseconds, tools between them may not.
+// Longest difference between stamps of one image in different files: text in seconds keeps nanoseconds, but
+// other tools may not.
 constexpr Duration kSameImage{10'000};
 
-constexpr int kFollowed = 0;  // kind of a track in the image panel's message: the file says no more
+constexpr int kFollowed = 0;  // kind of a track in the image panel's message; the file does not give it
 
-/// Tenths of a pixel are enough to look at.
+/// A tenth of a pixel is enough for display.
 void addPixel(nlohmann::ordered_json& list, double x, double y) {
   list.push_back(std::round(10 * x) / 10);
   list.push_back(std::round(10 * y) / 10);
@@ -69,12 +70,12 @@ std::vector<std::size_t> RunMoments::spread(std::size_t most) const {
   }
   if (from.size() <= most) return from;
   std::vector<std::size_t> chosen;
-  // In the middle of equal parts: the first image has tracked nothing yet.
+  // From the middle of equal parts: the first image has no tracks yet.
   for (std::size_t k = 0; k < most; ++k) chosen.push_back(from[(2 * k + 1) * from.size() / (2 * most)]);
   return chosen;
 }
 
-/// Lower quality until the picture is small enough; empty where it is not even then.
+/// Reduces the quality until the picture is small enough; empty if that is not possible.
 std::string RunMoments::pictureText(const ImageView& image, const PictureBounds& bounds) {
   constexpr std::array kQualities = {80, 60, 40, 20};  // of JPEG
   for (const int quality : kQualities) {
@@ -121,7 +122,7 @@ nlohmann::ordered_json RunMoments::message(std::size_t moment, const PictureBoun
   try {
     mesh = kept_.meshAt(stamp);
   } catch (const InputError&) {
-    // Damaged: as if it were not there.
+    // Damaged: treated as missing.
   }
   Json message = {{"t", (stamp - first_).seconds()},
                   {"frame", moment},
@@ -162,7 +163,7 @@ nlohmann::ordered_json RunMoments::tracksJson(const KeptKeyframe& keyframe, std:
 }
 
 nlohmann::ordered_json RunMoments::loopJson(const LoopRevisit& loop, std::size_t camera) const {
-  // A match names a track, pixels, or both.
+  // A match gives a track, pixels, or both.
   const auto pixelOf = [&](const RevisitFeature& feature, Stamp stamp) -> std::optional<Eigen::Vector2f> {
     if (feature.seen[camera]) return feature.pixel[camera];
     const KeptKeyframe* keyframe = feature.has_track ? kept_.keyframeAt(stamp) : nullptr;
@@ -228,7 +229,7 @@ nlohmann::ordered_json servedMoments(const RunMoments& moments, const std::strin
 nlohmann::ordered_json embeddedMoments(RunMoments& moments, std::size_t most_bytes) {
   if (!moments.hasImages()) return nullptr;
   constexpr std::size_t kHandful = 6;
-  constexpr int kWidth = 480;  // px at most: half of a usual image's
+  constexpr int kWidth = 480;  // px, maximum: half of a usual image's width
   const std::vector<std::size_t> chosen = moments.spread(kHandful);
   nlohmann::ordered_json json = {{"cameras", moments.camerasJson()},
                                  {"playback", moments.playbackJson(chosen)}};

@@ -10,7 +10,7 @@ namespace swiftlet {
 namespace {
 
 PoseErrors errorsOf(const RunView& view, const Association& pairs) {
-  // The attitude's own fit: that of the positions is loose over a short path.
+  // Fitted to the attitudes themselves: the fit of the positions is inaccurate over a short path.
   Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   for (const PosePair& pair : pairs.pairs) turns += pair.truth.R() * pair.estimate.R().transpose();
   const Eigen::Quaterniond turn = yawRotation(turns);

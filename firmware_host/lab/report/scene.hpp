@@ -8,8 +8,8 @@
 
 namespace swiftlet {
 
-/// {"trajectories": [{"name", "style", "count", "points", "value", "value_label"}], "surfaces": [as
-/// surfaceJson() says]}. `truth`: the true surface in the truth's axes; null: surfaces have no error.
+/// {"trajectories": [{"name", "style", "count", "points", "value", "value_label"}], "surfaces": [results of
+/// surfaceJson()]}. `truth`: the true surface in the truth's axes; null: surfaces have no errors.
 nlohmann::ordered_json sceneOf(const RunView& view, const MeshDistance* truth);
 
 }  // namespace swiftlet

@@ -30,7 +30,7 @@ Plot figurePlot(const RunView& view, const char* id, const char* title, const ch
   return plot;
 }
 
-/// Three axes, the truth's behind them where it has them.
+/// Three axes, with the truth's behind them if known.
 Plot vectorPlot(const RunView& view, const char* id, const char* title, const char* unit,
                 Eigen::Vector3d StoredState::*estimate, Eigen::Vector3d TrajectoryPoint::*truth) {
   Plot plot{id, "State", title, PlotKind::kTime, "time [s]", unit, "", {}, {}, {}};
@@ -51,7 +51,7 @@ Plot vectorPlot(const RunView& view, const char* id, const char* title, const ch
   return plot;
 }
 
-/// 3 sigma of the largest axis of a block of the state.
+/// 3 sigma of the axis with the largest variance in a block of the state.
 Plot sigmaPlot(const RunView& view, const char* id, const char* title, const char* unit, int block,
                double scale) {
   Plot plot{id, "State", title, PlotKind::kTime, "time [s]", unit, "", {}, {}, {}};

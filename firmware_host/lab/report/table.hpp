@@ -1,5 +1,5 @@
 #pragma once
-// The report's tables: facts, figures and counters of a run, and what differs between two.
+// The report's tables: facts, figures and counters of a run, and the differences between two runs.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -14,7 +14,7 @@ struct Table {
   std::string title;
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;
-  bool folded = false;  ///< long: shown on a click
+  bool folded = false;  ///< long table, shown on a click
 };
 
 /// {"id", "title", "columns", "rows", "folded"}
@@ -23,12 +23,12 @@ nlohmann::ordered_json toJson(const Table& table);
 /// A number as tables show it: five digits.
 std::string shown(double value);
 
-/// Facts, accuracy, latencies beside their budgets, CPU, memory, counters, settings. A table without rows is
-/// left out.
+/// Facts, accuracy, latencies with their budgets, CPU, memory, counters, settings. Tables without rows are
+/// omitted.
 std::vector<Table> tablesOf(const RunView& view);
 
-/// What the settings, versions, accuracy, counters and costs of two runs have different: name, both values
-/// and, of numbers, their difference. What only one of them has is named too.
+/// Differences in settings, versions, accuracy, counters and costs of two runs: name, both values and, for
+/// numbers, their difference. Values that only one run has are listed too.
 std::vector<Table> differencesOf(const RunView& a, const RunView& b);
 
 }  // namespace swiftlet

@@ -68,7 +68,7 @@ Table accuracyTable(const RunView& view) {
   if (!view.hasTruth()) return table;
   const Accuracy& accuracy = view.odometry;
   const TrajectoryError& absolute = accuracy.absolute;
-  // One number a row: two runs are compared by them.
+  // One number per row, so that two runs can be compared.
   const auto add = [&](const std::string& what, double value) {
     table.rows.push_back({what, fmt::format("{:.4f}", value)});
   };
@@ -94,7 +94,7 @@ Table accuracyTable(const RunView& view) {
   return table;
 }
 
-/// A figure beside its budget: "3.2 / 9".
+/// A figure with its budget: "3.2 / 9".
 std::string beside(double measured, const std::map<std::string, double>& budgets, const std::string& figure) {
   const auto found = budgets.find(figure);
   if (found == budgets.end()) return shown(measured);
@@ -170,7 +170,7 @@ Table loopsTable(const RunView& view) {
   return table;
 }
 
-/// Figures that two runs are compared by, by name.
+/// Figures for comparing two runs, by name.
 std::map<std::string, std::string> namedFigures(const RunView& view, const std::string& part) {
   std::vector<std::vector<std::string>> rows;
   if (part == "accuracy") {
@@ -180,7 +180,8 @@ std::map<std::string, std::string> namedFigures(const RunView& view, const std::
   }
   std::map<std::string, std::string> figures;
   for (const std::vector<std::string>& row : rows) {
-    // Histograms and sums differ always and say nothing beside their percentiles; stamps are in seconds too.
+    // Histograms and sums always differ and add nothing to their percentiles; stamps are also given in
+    // seconds.
     if (row[0].ends_with(".histogram") || row[0].ends_with("total_s") || row[0].ends_with("_ns")) {
       continue;
     }

@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kTime = "time [s]";
 
-/// The value of the sample nearest in time; `t` rises.
+/// The value of the sample nearest in time; `t` must rise.
 double nearest(const std::vector<double>& t, const std::vector<double>& values, double at) {
   const auto after = std::ranges::lower_bound(t, at);
   if (after == t.begin()) return values.front();
@@ -19,7 +19,7 @@ double nearest(const std::vector<double>& t, const std::vector<double>& values, 
   return t[i] - at < at - t[i - 1] ? values[i] : values[i - 1];
 }
 
-/// What says where a trajectory went wrong: by time.
+/// Quantity over time that shows where a trajectory went wrong.
 struct Judge {
   std::string label;
   std::vector<double> t;
@@ -76,7 +76,7 @@ Plot plan(const RunView& view, const Judge& judge, const char* id, const char* t
   return plot;
 }
 
-/// The horizontal axis along which the flight is longer: the side view looks across it.
+/// The horizontal axis along which the flight is longer: the side view is perpendicular to it.
 int longerAxis(const Trajectory& poses) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9);
   Eigen::Vector3d high = -low;
