@@ -1,20 +1,20 @@
 #pragma once
-// The ends of the graph's arrows. A reader declares its end, with capacity, policy and counter, as a
-// member of its node; graph.cpp leads a writer's `Out` to it with `out.to(in)`: each fact stands once.
+// The ends of the graph's arrows. A reader declares its end as a member of its node, with capacity, policy
+// and counter. graph.cpp connects a writer's `Out` to it by `out.to(in)`. So each fact is stated once.
 //
 // | reader's end  | carries                         | when full
 // | QueueIn<T, N> | every value, in order           | refused and counted, unless the writer asks hasRoom()
 // | LatestIn<T>   | the newest value                | the older value is overwritten
 // | SlotIn        | slots of a pool, lent by handle | the oldest goes back to the writer, counted
 //
-// Threads: the writer's node calls Out; the reader's node calls the rest of In. Counters are for anyone.
+// Threads: the writer's node calls Out; the reader's node calls the rest of In; counters are for any thread.
 // Memory: a queue's values inside it, three of a newest value. An Out to a queue keeps one value to write
-//   into while the queue is full. No allocation after the graph is built.
-// Cost: of the carrier in estimator/core, and a virtual call. Of several readers the first is written in
-//   place, the others get copies.
+// into while the queue is full. No allocation after the graph is built.
+// Cost: that of the carrier in estimator/core, and a virtual call. The first of several readers is written in
+// place; the others get copies.
 //
-// Recorded schedule: what timing decided is told to the readers' ends before the node's turn: how many values
-//   (SampleIn::limit), which newest value (LatestIn::expect), which slot (SlotIn::tell).
+// Recorded schedule: before a node's turn, its ends are given what timing decided in the recorded run: how
+// many values (SampleIn::limit), which newest value (LatestIn::expect), which slot (SlotIn::tell).
 
 #include <cstdint>
 #include <deque>

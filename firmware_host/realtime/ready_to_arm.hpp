@@ -79,7 +79,7 @@ struct ArmingFacts {
   int smooth_level = 0;
 
   double vehicle_tilt = 0;  ///< rad, between the world's up and the vehicle's up as sent to the autopilot
-  Duration tilted_for;      ///< time beyond ArmingSettings::tilt; 0: not tilted, or no autopilot is told
+  Duration tilted_for;      ///< time beyond ArmingSettings::tilt; 0: not tilted, or no autopilot
 
   int members_unwell = 0;              ///< in the supervisor's table
   const char* first_unwell = "";       ///< its name

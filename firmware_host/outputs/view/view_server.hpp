@@ -43,7 +43,7 @@ class ViewServer {
 
   /// The address with the actual port.
   [[nodiscard]] const ViewAddress& address() const;
-  /// Of the page, including the token if one is required (view_token.hpp).
+  /// URL of the page, including the token if one is required (view_token.hpp).
   [[nodiscard]] std::string url() const;
 
   class Work;
