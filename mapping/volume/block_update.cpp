@@ -97,7 +97,16 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   const Floats s = ahead * slope;
   // A measured surface, or a view that is free at least up to here.
   const Ints hit = reached & (s > -behind);
-  const Ints seen = hit | ((measured < 0.0F) & (s >= truncation));
+  Ints seen = hit | ((measured < 0.0F) & (s >= truncation));
+  if (const Ints free = seen & (s >= truncation); lanes::any(free)) {
+    // One pixel speaks for all of a voxel, which may hold a pole that the pixel beside it measures.
+    const Ints tile = (row / PreparedImage::kTile) * image_->tileColumns() + column / PreparedImage::kTile;
+    Floats nearest;
+    lanes::gather(nearest, image_->nearest(), tile);
+    const Floats away = nearest - z;
+    const auto voxel = static_cast<float>(settings_.voxel_size);
+    seen &= ~(free & (away < voxel) & (away > -voxel));
+  }
   if (!lanes::any(seen)) return;
 
   Floats pixel_weight;

@@ -7,9 +7,11 @@
 // distance s is d - z times the pixel's slope, its distance to the plane that the pixel shows
 // (prepared_image.hpp). Voxels with -behind <= s are observed; s is cut at the truncation distance, so that
 // free voxels are carved. The weight falls from one voxel behind the surface to zero at `behind` (Bylow et
-// al., RSS 2013; Oleynikova et al., IROS 2017). Weights grow up to most_weight. If a certain measurement
-// shows surface in free space, all earlier views count as one: an object that appears is mapped within some
-// images, however long the space was free. Eight voxels at a time (lanes.hpp). Cost: docs/experiments/map.md.
+// al., RSS 2013; Oleynikova et al., IROS 2017). A voxel is not free if the nearest pixel of its tile is
+// within a voxel of its depth: it may hold an object thinner than itself. Weights grow up to most_weight. If
+// a certain measurement shows surface in free space, all earlier views count as one: an object that appears
+// is mapped within some images, however long the space was free. Eight voxels at a time (lanes.hpp). Cost:
+// docs/experiments/map.md.
 
 #include <Eigen/Core>
 #include <array>

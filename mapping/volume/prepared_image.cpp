@@ -37,10 +37,12 @@ PreparedImage::PreparedImage(std::size_t most_pixels)
       inverse_(most_pixels + 1),
       label_(most_pixels + 1),
       free_(tilesOf(most_pixels)),
-      deepest_(tilesOf(most_pixels)) {}
+      deepest_(tilesOf(most_pixels)),
+      nearest_(tilesOf(most_pixels)) {}
 
 std::size_t PreparedImage::bytes() const {
-  return (4 * depth_.size() + free_.size() + deepest_.size()) * sizeof(float) + label_.size();
+  return (4 * depth_.size() + free_.size() + deepest_.size() + nearest_.size()) * sizeof(float) +
+         label_.size();
 }
 
 Status PreparedImage::prepare(const DepthImageView& image, const VolumeSettings& settings,
@@ -188,6 +190,7 @@ void PreparedImage::buildPyramid() {
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       float nearest = kFarAway, deepest = 0;
+      bool has_hole = false;
       const int bottom = std::min((row + 1) * kTile, camera_.height);
       const int right = std::min((column + 1) * kTile, camera_.width);
       for (int v = row * kTile; v < bottom; ++v) {
@@ -198,14 +201,15 @@ void PreparedImage::buildPyramid() {
           deepest = std::max(deepest, d);
           if (d > 0) {
             nearest = std::min(nearest, d);
-          } else if (nearest > 0 && isHole(u, v)) {
-            nearest = 0;
+          } else if (!has_hole) {
+            has_hole = isHole(u, v);
           }
         }
       }
       const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
                       static_cast<std::size_t>(column);
-      free_[at] = deepest > 0 ? nearest : 0.0F;
+      free_[at] = deepest > 0 && !has_hole ? nearest : 0.0F;
+      nearest_[at] = nearest;
       deepest_[at] = deepest;
     }
   }

@@ -63,6 +63,8 @@ class PreparedImage {
     return deepest_[static_cast<std::size_t>(row) * static_cast<std::size_t>(level_[0].width) +
                     static_cast<std::size_t>(column)];
   }
+  /// The least measured depth of each tile, rows of tileColumns().
+  [[nodiscard]] const float* nearest() const { return nearest_.data(); }
   [[nodiscard]] int tileColumns() const { return level_[0].width; }
   [[nodiscard]] int tileRows() const { return level_[0].height; }
   [[nodiscard]] std::size_t bytes() const;
@@ -93,6 +95,7 @@ class PreparedImage {
   float even_weight_ = 0;
   std::vector<float> free_;
   std::vector<float> deepest_;
+  std::vector<float> nearest_;
   Level level_[kMostLevels];
   int levels_ = 0;
 };

@@ -15,13 +15,13 @@ const SE3 kFromOrigin = lookAt({0, 0, 0}, {1, 0, 0});
 struct View {
   explicit View(const VolumeSettings& settings = sceneSettings())
       : volume(settings), integrator(volume, kSceneCamera.pixels()) {}
-  void add(SceneImage image, const float* sigma = nullptr) {
+  void add(SceneImage image, const float* sigma = nullptr, const SE3& pose = kFromOrigin) {
     stamp += 1;
     image.stamp = {1'000'000'000LL * stamp};
     DepthImageView with_sigma = image.view();
     with_sigma.sigma = sigma;
     VolumeStep step;
-    REQUIRE(integrator.step(with_sigma, kFromOrigin, {}, step).ok());
+    REQUIRE(integrator.step(with_sigma, pose, {}, step).ok());
   }
   /// The voxel at `p` is known and in front of all surface.
   [[nodiscard]] bool isFree(const Eigen::Vector3d& p) const {
@@ -114,5 +114,24 @@ TEST_CASE("what is beyond the range is free up to it, less three sigma") {
     CHECK(view.isFree({0.8, 0, 0}));
     CHECK(view.isFree({1.6, 0, 0}) == (sigma < 0.1F));
     CHECK_FALSE(view.isFree({2.2, 0, 0}));
+  }
+}
+
+TEST_CASE("a pole that is measured, thinner than a voxel, is not free") {
+  for (const double distance : {1.32, 2.02}) {
+    for (const double side : {-0.02, -0.01, 0.0, 0.01, 0.02}) {
+      // From the middle of a voxel.
+      const double y = 0.125 + side;
+      const auto pole_before_wall = [&](const Eigen::Vector3d& o, const Eigen::Vector3d& r) {
+        const double t = (distance - o.x()) / r.x();
+        return std::abs(o.y() + t * r.y() - y) < 0.012 ? t : kFarWall(o, r);
+      };
+      View view;
+      for (int i = 0; i < 10; ++i) view.add(render(kFromOrigin, 1, pole_before_wall));
+      int free = 0;
+      for (int i = -8; i < 8; ++i) free += view.isFree({distance, y, 0.05 * i + 0.01}) ? 1 : 0;
+      INFO("at " << distance << " m, " << side << " m from the middle of a voxel");
+      CHECK(free == 0);
+    }
   }
 }

@@ -140,7 +140,7 @@ TEST_CASE("the update by eights is the update voxel by voxel") {
   BlockUpdate update(settings);
   const SE3 T_camera_world = lookAt({0.1, 0.05, -1.0}, {0, 0.1, 0.2}).inverse();
   update.begin(prepared, T_camera_world);
-  std::size_t observed = 0, came_count = 0;
+  std::size_t observed = 0, came_count = 0, beside_count = 0;
   for (const BlockIndex& index :
        {BlockIndex{0, 0, 0}, BlockIndex{-1, 0, 0}, BlockIndex{0, -1, -1}, BlockIndex{1, 1, 0}}) {
     VoxelBlock block{}, twin{};
@@ -168,7 +168,13 @@ TEST_CASE("the update by eights is the update voxel by voxel") {
         const auto measured = static_cast<double>(prepared.depth()[pixel]);
         s = (std::abs(measured) - p.z()) * static_cast<double>(prepared.slope()[pixel]);
         const bool hit = measured > 0 && s > -settings.behind && measured - p.z() > -settings.behind_ray;
-        if (hit || (measured < 0 && s >= settings.truncation)) {
+        const std::size_t tile = static_cast<std::size_t>(v) / 8 * 20 + static_cast<std::size_t>(u) / 8;
+        // Something as near as the voxel is seen beside its pixel.
+        const bool beside =
+            s >= settings.truncation &&
+            std::abs(static_cast<double>(prepared.nearest()[tile]) - p.z()) < settings.voxel_size;
+        beside_count += beside ? 1 : 0;
+        if (!beside && (hit || (measured < 0 && s >= settings.truncation))) {
           const double drop = std::min((settings.behind + s) / (settings.behind - settings.voxel_size), 1.0);
           gain = std::max(256.0 * drop, 1.0);
         }
@@ -196,6 +202,7 @@ TEST_CASE("the update by eights is the update voxel by voxel") {
   }
   CHECK(observed > 300);
   CHECK(came_count > 5);
+  CHECK(beside_count > 5);
 }
 
 TEST_CASE("what comes into free space is mapped within some images, however long it was free") {
