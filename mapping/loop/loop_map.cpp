@@ -98,10 +98,13 @@ void LoopMap::releaseTies(std::uint32_t piece) {
   for (std::uint32_t id = 0; id < loops(); ++id) {
     const std::uint32_t a = component(loopEdge(id).from);
     const std::uint32_t b = component(loopEdge(id).to);
-    if (selected(id) && a != b && (a == piece || b == piece)) static_cast<void>(graph_.release(id));
+    // The whole set: what is left of it would be too few to be accepted, and still be the largest.
+    const LoopVerdict verdict = graph_.selection().verdict(id);
+    const bool in_set = verdict == LoopVerdict::kSelected || verdict == LoopVerdict::kUnsupported;
+    if (in_set && a != b && (a == piece || b == piece)) static_cast<void>(graph_.release(id));
   }
+  pieces_.follow(graph_);  // apart, so that the next ties align the piece anew
   graph_.search();
-  pieces_.follow(graph_);
 }
 
 Status LoopMap::settle(int iterations, bool& moved) {

@@ -107,8 +107,8 @@ class LoopMap {
   /// LoopSelection.
   Status addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_to,
                  const PoseMatrix<SE3>& covariance, std::uint32_t& id);
-  /// Releases the accepted loops between this piece and others. Loops that contradicted them are searched
-  /// anew.
+  /// Releases the loops of the largest sets between this piece and others. Loops that contradicted them are
+  /// searched anew.
   void releaseTies(std::uint32_t piece);
   /// RobustGraph::settle(), up to `iterations`. `moved`: poses may have changed.
   Status settle(int iterations, bool& moved);

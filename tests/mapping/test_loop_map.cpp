@@ -379,3 +379,41 @@ TEST_CASE("ten thousand random operations lose no loop") {
     CHECK(map.counters().loops_carried > 20);
   }
 }
+
+TEST_CASE("ties that are taken back leave those that contradicted them") {
+  LoopMap map({}, {60, 40});
+  constexpr std::uint32_t kPiece = 20;  // nodes
+  std::vector<SE3> truth;
+  for (std::uint32_t k = 0; k < 2 * kPiece; ++k) {
+    const double angle = 0.1 * (k % kPiece);
+    truth.emplace_back(expSo3(Eigen::Vector3d(0, 0, angle)),
+                       Eigen::Vector3d(3 * std::sin(angle), 3 - 3 * std::cos(angle), 0));
+    LoopMap::Node node;
+    node.frame = k;
+    node.T_world_body = truth[k];
+    const LoopMap::Link link{k > 0 ? truth[k - 1].inverse() * truth[k] : SE3(),
+                             covarianceOf(kOdometryTurn, kOdometryMove)};
+    REQUIRE(map.add(node, k % kPiece == 0 ? nullptr : &link).ok());
+  }
+  const SE3 elsewhere(expSo3(Eigen::Vector3d(0, 0, 3)), Eigen::Vector3d(4, 0, 0));
+  const auto tie = [&](std::uint32_t k, const SE3& shift) {
+    std::uint32_t id = 0;
+    REQUIRE(map.addLoop(k, kPiece + k, truth[k].inverse() * shift * truth[kPiece + k],
+                        covarianceOf(kLoopTurn, kLoopMove), id)
+                .ok());
+  };
+  const auto settle = [&map] {
+    for (bool moved = false; !map.atRest();) REQUIRE(map.settle(10, moved).ok());
+  };
+  constexpr std::uint32_t kWrong = 9, kRight = 3;
+  for (std::uint32_t k = 0; k < kWrong; ++k) tie(k, elsewhere);
+  for (std::uint32_t k = 0; k < kRight; ++k) tie(kWrong + k, SE3());
+  settle();
+  REQUIRE(map.joined(0, kPiece));
+  REQUIRE(map.selected() == kWrong);
+  map.releaseTies(map.component(kPiece));
+  settle();
+  CHECK(map.joined(0, kPiece));
+  CHECK(map.selected() == kRight);
+  CHECK((map.pose(kPiece).translation - truth[kPiece].translation).norm() < 0.1);
+}
