@@ -16,7 +16,7 @@ namespace swiftlet {
 namespace {
 
 constexpr double kSumTolerance = 0.01;
-constexpr const char* kForm = "Write true,said,probability, for example 3,4,0.05";
+constexpr const char* kForm = "Write true,predicted,probability, for example 3,4,0.05";
 
 /// The fields of one line; throws unless they are three numbers in range.
 struct ConfusionLine {

@@ -9,7 +9,7 @@
 
 namespace swiftlet {
 
-/// Lines `true,said,probability` (`#` starts a comment), labels from 1 to 31. The probabilities of one true
+/// Lines `true,predicted,probability` (`#` starts a comment), labels from 1 to 31. The probabilities of one true
 /// label sum to 1; pairs that are not listed have probability 0. A true label without any line is recognized
 /// with probability `right`, and the other labels share the rest equally. InputError with line, field and
 /// remedy.

@@ -178,8 +178,9 @@ std::vector<Setting> estimationSettings() {
        "harder.",
        real(kOdometry, &O::plane_point_sigma, 1e-4, 0.1)},
       {"health.max_speed", "m/s",
-       "Highest speed of the vehicle. The health is not good while the estimated speed is above it, and lost "
-       "if it stays above.",
+       "Highest speed of the vehicle. The health is not good while the estimated speed is above it. If it "
+       "stays "
+       "above, the estimate starts anew.",
        real(kOdometry, &O::max_speed, 0.1, 1000)},
       {"health.max_acceleration", "m/s^2",
        "Highest acceleration of the vehicle, averaged over half a second. The health is not good while the "
@@ -276,7 +277,8 @@ std::vector<Setting> estimationSettings() {
        "Probability that a pixel's label is correct. Larger values weigh each observation more.",
        real(&Settings::map_stage, &MapSettings::label_certainty, 0.5, 0.999)},
       {"map.confusion", "",
-       "File with the confusion probabilities of the labelling network, one line true,said,probability for "
+       "File with the confusion probabilities of the labelling network, one line true,predicted,probability "
+       "for "
        "each pair of labels; empty: map.label_certainty applies to all labels.",
        TextSetting{member(&Settings::map, &MapGroup::confusion), "a file name, or empty"}},
       {"calibration.accept_unusual_rig", "",
