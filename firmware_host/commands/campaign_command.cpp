@@ -116,8 +116,10 @@ void addCampaignCommand(CLI::App& app, int& exit_code) {
   command->footer(
       "Example:\n  swiftlet campaign logs.yaml --out today --jobs 4\n"
       "  swiftlet campaign logs.yaml --out new --beside today\n"
-      "  swiftlet campaign logs.yaml --list | parallel swiftlet campaign logs.yaml --job {}\n"
-      "  sbatch --array=1-200 --wrap 'swiftlet campaign logs.yaml --job $SLURM_ARRAY_TASK_ID'");
+      "  swiftlet campaign logs.yaml --list | parallel swiftlet campaign logs.yaml --out night --job {}\n"
+      "  sbatch --wait --array=1-200 --wrap 'swiftlet campaign logs.yaml --out night --job "
+      "$SLURM_ARRAY_TASK_ID'\n"
+      "  swiftlet campaign logs.yaml --out night --table");
   command->callback([options, &exit_code] { exit_code = campaign(*options); });
 }
 
