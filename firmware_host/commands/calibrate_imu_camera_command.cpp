@@ -1,9 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,38 +10,21 @@
 #include "drivers/calibration/calibration.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/imu_file.hpp"
-#include "drivers/target/target_file.hpp"
+#include "firmware_host/commands/board_log.hpp"
 #include "firmware_host/commands/calibrate_commands.hpp"
 #include "firmware_host/commands/program.hpp"
-#include "firmware_host/commands/stop_signal.hpp"
-#include "firmware_host/lab/calibrate/board/log_views.hpp"
-#include "firmware_host/lab/calibrate/cameras/calibrate_cameras.hpp"
-#include "firmware_host/lab/calibrate/cameras/camera_files.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/calibrate_imu_camera.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/imu_camera_files.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
 #include "firmware_host/outputs/run_folder/calibration_files.hpp"
-#include "firmware_host/realtime/console.hpp"
-#include "firmware_host/realtime/progress.hpp"
 
 namespace swiftlet {
 namespace {
 
-struct ImuCameraOptions {
-  LogViewsRequest log;
-  std::string target;
+struct ImuCameraOptions : BoardLogOptions {
   std::string cameras;
   std::string imu;
-  std::string out;
 };
-
-constexpr int kProgressParts = 100;
-
-std::function<void(double)> partsOf(Progress& progress) {
-  return [&progress](double part) {
-    progress.update(static_cast<std::uint64_t>(std::lround(part * kProgressParts)));
-  };
-}
 
 /// Initial lenses of the batch, read from a file.
 CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const std::string& file) {
@@ -64,22 +45,7 @@ CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const st
   return solution;
 }
 
-CameraSolution findCameras(const ImuCameraOptions& options, const LogViews& log) {
-  CameraInput input;
-  input.target = options.log.target;
-  input.views = log.views;
-  input.camera_count = log.camera_count;
-  input.image_size = log.image_size;
-  Progress progress("fitting cameras", kProgressParts);
-  const CameraSolution solution = calibrateCameras(input, partsOf(progress));
-  progress.finish();
-  return solution;
-}
-
 int calibrateLogImuCamera(ImuCameraOptions options) {
-  options.log.target = readTarget(options.target);
-  options.log.show_progress = true;
-  options.log.stop = &stopOnSignal();
   ImuCameraInput input;
   // Errors in the files are reported before images are searched.
   std::optional<CameraChain> chain;
@@ -88,26 +54,23 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   if (!options.imu.empty()) input.noise = readImuNoise(options.imu, left_out);
   input.noise_told = !options.imu.empty();
 
-  LogViews log = readLogViews(options.log);
-  warnAll(log.warnings);
-  for (std::size_t c = 0; c < log.camera_count; ++c) {
-    fmt::print("camera {}: board found in {} of {} images\n", c, log.with_board[c], log.images[c]);
-  }
+  std::optional<LogViews> found = searchBoard(options);
+  if (!found) return kExitFailed;
+  LogViews& log = *found;
   if (log.samples.empty()) {
     throw InputError(options.log.log, 0, "", "has no IMU samples", "Record them with the images");
   }
   input.target = options.log.target;
   input.samples = std::move(log.samples);
   input.noise.rate_hz = medianRate(input.samples);
-  input.cameras = chain ? camerasOf(*chain, log, options.cameras) : findCameras(options, log);
+  input.cameras = chain ? camerasOf(*chain, log, options.cameras) : fitCameras(options, log, 0);
   if (chain && chain->has_imu) input.told = chain->rig;
   input.views = std::move(log.views);
   const bool lenses = input.cameras.camera_count > 0 && input.cameras.camera[0].model.width() > 0;
   ImuCameraSolution solution;
   if (lenses) {
-    Progress progress("fitting cameras and IMU", kProgressParts);
-    solution = calibrateImuCamera(input, partsOf(progress));
-    progress.finish();
+    solution = withProgress("fitting cameras and IMU",
+                            [&](const auto& progress) { return calibrateImuCamera(input, progress); });
   }
   fmt::print("{}", describe(solution));
   // Without a rolling-shutter model, the camera-only step objects to errors that the batch explains.
@@ -131,11 +94,7 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(),
                        lenses ? imuCameraPage(solution, input.target, options.log.log)
                               : cameraPage(input.cameras, input.target, options.log.log));
-  if (!solution.reasons.empty()) {
-    for (const std::string& reason : solution.reasons) warn("repeat: " + reason + "\n");
-    warn("No calibration is written.\n");
-    return kExitFailed;
-  }
+  if (!solution.reasons.empty()) return refuseCalibration(solution.reasons);
   writeCalibration(options.out, calibrationOf(solution, input.noise));
   fmt::print("good; written to {}\n", options.out);
   return kExitDone;
@@ -148,16 +107,9 @@ void addCalibrateImuCamera(CLI::App& calibrate, int& exit_code) {
                                                "Calibrate cameras and IMU together: lenses, extrinsics, time "
                                                "offset, readout time, scale and misalignment");
   auto options = std::make_shared<ImuCameraOptions>();
-  command
-      ->add_option(
-          "LOG", options->log.log,
-          "Images of the board and IMU samples: a EuRoC folder or archive, a bag, or a recording. No "
-          "calibration is needed")
-      ->required();
-  command
-      ->add_option("--target", options->target,
-                   "Board description: YAML from `swiftlet calibrate target` or Kalibr")
-      ->required();
+  options->addTo(*command,
+                 "Images of the board and IMU samples: a EuRoC folder or archive, a bag, or a recording. No "
+                 "calibration is needed");
   command->add_option("--cameras", options->cameras,
                       "Kalibr camchain to start from, with or without an IMU. Default: the cameras are "
                       "calibrated from the log first");
@@ -166,7 +118,6 @@ void addCalibrateImuCamera(CLI::App& calibrate, int& exit_code) {
                       "a typical MEMS IMU");
   command->add_option("--out", options->out, "Folder for the calibration in EuRoC's and Kalibr's formats")
       ->required();
-  command->add_flag("--mono", options->log.mono, "Use camera 0 only");
   command->footer(
       "Example:\n"
       "  swiftlet calibrate imu-camera board_log --target board.yaml --imu imu.yaml --out rig\n"

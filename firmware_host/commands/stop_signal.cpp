@@ -22,6 +22,11 @@ const std::atomic<bool>& stopOnSignal() {
   return stop_asked;
 }
 
+void endOnSignal() {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
+
 std::atomic<bool>& surviveHangUp() {
   hung_up.store(false, std::memory_order_relaxed);
   if (std::signal(SIGHUP, noteHangUp) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);

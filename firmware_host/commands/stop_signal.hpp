@@ -9,6 +9,9 @@ namespace swiftlet {
 /// pipe (SIGPIPE) or to a terminal that belongs to another program (SIGTTOU) do not end it either.
 const std::atomic<bool>& stopOnSignal();
 
+/// From now on SIGINT and SIGTERM end the program again: for what follows a part that reads the flag.
+void endOnSignal();
+
 /// Clears the flag. From now on SIGHUP, the terminal's end, sets it instead of ending the program. A program
 /// started with SIGHUP ignored (nohup) keeps ignoring it.
 std::atomic<bool>& surviveHangUp();

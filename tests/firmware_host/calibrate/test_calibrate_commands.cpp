@@ -1,0 +1,65 @@
+// `swiftlet calibrate` as a shell calls it: what it must not write, and what it must not leave.
+#include <signal.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "drivers/input/input_error.hpp"
+#include "drivers/recorded/image_files.hpp"
+#include "drivers/target/target_file.hpp"
+#include "firmware_host/files/run_claim.hpp"
+#include "firmware_host/files/whole_file.hpp"
+#include "tests/firmware_host/said.hpp"
+#include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
+
+using namespace swiftlet;
+using namespace swiftlet::test;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Grey images of one camera, without a board.
+std::string emptyLog(const ScratchFolder& folder, int images) {
+  const std::string pictures = folder.file("log/cam0/data");
+  fs::create_directories(pictures);
+  const std::vector<std::uint8_t> grey(640 * 480, 128);
+  for (int i = 0; i < images; ++i) {
+    writePng8(pictures + "/" + std::to_string(1000 + i) + ".png", grey.data(), 640, 480);
+  }
+  return folder.file("log");
+}
+
+std::string board(const ScratchFolder& folder) {
+  writeWholeFile(folder.file("board.yaml"), targetYaml(CalibrationTarget{}));
+  return folder.file("board.yaml");
+}
+
+bool endsProgram(int signal) {
+  struct sigaction action {};
+  sigaction(signal, nullptr, &action);
+  return action.sa_handler == SIG_DFL;
+}
+
+}  // namespace
+
+TEST_CASE("a search that the user stops gives no calibration, and later signals end the program") {
+  const ScratchFolder folder("calibrate_stopped");
+  const std::string log = emptyLog(folder, 200);
+  std::thread user([] {
+    while (endsProgram(SIGINT)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    kill(getpid(), SIGINT);
+  });
+  const Said said =
+      say({"calibrate", "cameras", log, "--target", board(folder), "--out", folder.file("rig")});
+  user.join();
+  CHECK(said.code == kExitFailed);
+  CHECK(contains(said.text, "stopped early"));
+  CHECK_FALSE(fs::exists(folder.file("rig")));
+  CHECK(endsProgram(SIGINT));
+  CHECK(endsProgram(SIGTERM));
+}
