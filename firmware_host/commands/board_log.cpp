@@ -7,6 +7,8 @@
 #include "drivers/target/target_file.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/commands/stop_signal.hpp"
+#include "firmware_host/files/output_guard.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/realtime/console.hpp"
 
 namespace swiftlet {
@@ -17,6 +19,16 @@ void BoardLogOptions::addTo(CLI::App& command, const std::string& log_help) {
       .add_option("--target", target, "Board description: YAML from `swiftlet calibrate target` or Kalibr")
       ->required();
   command.add_flag("--mono", log.mono, "Use camera 0 only");
+}
+
+void BoardLogOptions::checkOut(const std::vector<std::string>& other_inputs) const {
+  if (out.empty()) return;
+  std::vector<std::string> inputs = other_inputs;
+  inputs.push_back(log.log);
+  inputs.push_back(target);
+  refuseOutputInInput(out, inputs);
+  for (const std::string& file : calibrationFilesIn(out)) refuseOutputInInput(file, inputs);
+  refuseRunIn(out, RunKind::kCalibration);
 }
 
 std::optional<LogViews> searchBoard(BoardLogOptions& options) {

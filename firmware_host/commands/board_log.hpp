@@ -22,6 +22,9 @@ struct BoardLogOptions {
 
   /// Adds LOG, --target and --mono.
   void addTo(CLI::App& command, const std::string& log_help);
+  /// Called before the search, which takes minutes. InputError if the result would overwrite the log, the
+  /// board or one of the other files read, or files in `out` that no calibration wrote.
+  void checkOut(const std::vector<std::string>& other_inputs) const;
 };
 
 /// Reads the board, searches the log's images and prints where the board was found. Empty if the user stopped

@@ -9,6 +9,7 @@
 #include "firmware_host/commands/calibrate_commands.hpp"
 #include "firmware_host/commands/checks.hpp"
 #include "firmware_host/commands/program.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/calibrate/cameras/camera_files.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
@@ -21,13 +22,15 @@ struct CamerasOptions : BoardLogOptions {
 };
 
 int calibrateLogCameras(CamerasOptions options) {
+  options.checkOut({});
   const std::optional<LogViews> log = searchBoard(options);
   if (!log) return kExitFailed;
   const CameraSolution solution = fitCameras(options, *log, options.baseline_mm * 1e-3);
   fmt::print("{}", describe(solution));
+  std::optional<RunClaim> claim;
   if (!options.out.empty()) {
-    // Also written for a bad calibration, because the page shows the reason.
-    std::filesystem::create_directories(options.out);
+    // Also for a bad calibration: the page shows the reason, and no older calibration stays beside it.
+    claim.emplace(options.out, RunKind::kCalibration, false);
     const std::string page = (std::filesystem::path(options.out) / "report.html").string();
     writeCalibrationPage(page, cameraPage(solution, options.log.target, options.log.log));
     fmt::print("page written to {}\n", page);

@@ -13,6 +13,7 @@
 #include "firmware_host/commands/board_log.hpp"
 #include "firmware_host/commands/calibrate_commands.hpp"
 #include "firmware_host/commands/program.hpp"
+#include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/calibrate_imu_camera.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/imu_camera_files.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
@@ -46,6 +47,7 @@ CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const st
 }
 
 int calibrateLogImuCamera(ImuCameraOptions options) {
+  options.checkOut({options.cameras, options.imu});
   ImuCameraInput input;
   // Errors in the files are reported before images are searched.
   std::optional<CameraChain> chain;
@@ -90,7 +92,8 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   for (const std::string& key : left_out) {
     fmt::print("{} is not in {}: a typical MEMS IMU's is assumed\n", key, options.imu);
   }
-  std::filesystem::create_directories(options.out);
+  // Also for a bad calibration: the page shows the reason, and no older calibration stays beside it.
+  const RunClaim claim(options.out, RunKind::kCalibration, false);
   writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(),
                        lenses ? imuCameraPage(solution, input.target, options.log.log)
                               : cameraPage(input.cameras, input.target, options.log.log));

@@ -32,6 +32,9 @@ constexpr std::array kRunFolders = {"meshes", "recording", "estimated_calibratio
 constexpr std::array kMeshFiles = {"complete_mesh.ply", "local_mesh.ply", "summary.json", "trajectory.tum"};
 constexpr std::array kMapFiles = {"map.glb", "map.ply", "summary.json", "trajectory.tum"};
 constexpr std::array kPlaceFiles = {"places.csv", "summary.json"};
+constexpr std::array kCalibrationFiles = {"camchain.yaml", "camchain-imucam.yaml", "imu.yaml", "report.html"};
+constexpr std::array kSensorFolders = {"cam0", "cam1", "imu0"};
+constexpr const char* kSensorFile = "sensor.yaml";
 constexpr std::size_t kNumberDigits = 6;
 constexpr std::uint32_t kLargestNumber = 999'999;
 /// A board without a battery starts in 1970 or at its image's date; a clock in 2020 or later counts as set.
@@ -40,7 +43,7 @@ constexpr int kTriesForName = 1000;
 constexpr const char* kFlightsRemedy = "Make flights.folder writable, or choose another one";
 
 /// Words in the mark, indexed by RunKind.
-constexpr std::array kWords = {"replay", "flight", "mesh", "map", "place_list"};
+constexpr std::array kWords = {"replay", "flight", "mesh", "map", "place_list", "calibration"};
 
 constexpr const char* word(RunKind kind) { return kWords[static_cast<std::size_t>(kind)]; }
 
@@ -61,6 +64,7 @@ bool isRunFile(const std::string& name, RunKind kind) {
   const auto in = [&name](const auto& names) { return std::ranges::find(names, name) != names.end(); };
   if (kind == RunKind::kMesh) return in(kMeshFiles);
   if (kind == RunKind::kPlaceList) return in(kPlaceFiles);
+  if (kind == RunKind::kCalibration) return in(kCalibrationFiles);
   return (kind == RunKind::kMap ? in(kMapFiles) : in(kRunFiles)) || isNumbered(name, "map_epoch_", ".ply");
 }
 
@@ -71,7 +75,9 @@ std::string firstRunFile(const fs::path& folder, RunKind kind) {
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     const bool of_run = isRunFile(name, kind) || (kind == RunKind::kMesh && name == "meshes") ||
-                        (isWhole(kind) && std::ranges::find(kRunFolders, name) != kRunFolders.end());
+                        (isWhole(kind) && std::ranges::find(kRunFolders, name) != kRunFolders.end()) ||
+                        (kind == RunKind::kCalibration && fs::exists(entry.path() / kSensorFile, error) &&
+                         std::ranges::find(kSensorFolders, name) != kSensorFolders.end());
     if (of_run && (first.empty() || name < first)) first = name;
   }
   return first;
@@ -119,11 +125,10 @@ void removeRecording(const fs::path& folder) {
 
 /// Removes the files of calibration_files.hpp.
 void removeCalibration(const fs::path& folder) {
-  for (const char* sensor : {"cam0", "cam1", "imu0"}) {
-    removeFiles(folder / sensor, [](const std::string& name) { return name == "sensor.yaml"; });
+  for (const char* sensor : kSensorFolders) {
+    removeFiles(folder / sensor, [](const std::string& name) { return name == kSensorFile; });
     ::rmdir((folder / sensor).c_str());
   }
-  ::rmdir(folder.c_str());
 }
 
 void removeEarlierRun(const fs::path& folder, RunKind kind) {
@@ -132,7 +137,9 @@ void removeEarlierRun(const fs::path& folder, RunKind kind) {
     removeMeshes((folder / "meshes").string());
     ::rmdir((folder / "meshes").c_str());
     removeCalibration(folder / "estimated_calibration");
+    ::rmdir((folder / "estimated_calibration").c_str());
   }
+  if (kind == RunKind::kCalibration) removeCalibration(folder);
   removeFiles(folder, [kind](const std::string& name) { return isRunFile(name, kind); });
 }
 
@@ -144,11 +151,19 @@ void makeFolders(const std::string& folder, const char* remedy) {
   }
 }
 
-void refuseLog(const fs::path& folder) {
-  const fs::path path = fs::absolute(folder).lexically_normal();
+/// Whether the folder has a log's parts. A calibration has folders of the same names.
+bool holdsLog(const fs::path& folder, RunKind kind) {
   std::error_code error;
+  if (fs::exists(folder / "mav0", error)) return true;
+  if (kind != RunKind::kCalibration) return fs::exists(folder / "imu0", error);
+  return fs::exists(folder / "imu0/data.csv", error) || fs::exists(folder / "cam0/data.csv", error) ||
+         fs::exists(folder / "cam0/data", error);
+}
+
+void refuseLog(const fs::path& folder, RunKind kind) {
+  const fs::path path = fs::absolute(folder).lexically_normal();
   const bool inside = std::ranges::any_of(path, [](const fs::path& part) { return part == "mav0"; });
-  if (!inside && !fs::exists(path / "mav0", error) && !fs::exists(path / "imu0", error)) return;
+  if (!inside && !holdsLog(path, kind)) return;
   throw InputError(folder.string(), 0, "", "is a log, and no run is written into one",
                    "Give another folder with --out");
 }
@@ -228,12 +243,19 @@ std::optional<RunKind> runKindOf(const std::string& folder) {
 }
 
 void refuseRunIn(const std::string& folder, RunKind kind) {
-  refuseLog(folder);
+  refuseLog(folder, kind);
   refuseOthers(folder, kind);
 }
 
+std::vector<std::string> calibrationFilesIn(const std::string& folder) {
+  std::vector<std::string> files;
+  for (const char* name : kCalibrationFiles) files.push_back(fs::path(folder) / name);
+  for (const char* sensor : kSensorFolders) files.push_back(fs::path(folder) / sensor / kSensorFile);
+  return files;
+}
+
 RunClaim::RunClaim(const std::string& folder, RunKind kind, bool replace) {
-  refuseLog(folder);
+  refuseLog(folder, kind);
   makeFolders(folder, "Give another folder with --out");
   if (!replace) refuseOthers(folder, kind);
   removeEarlierRun(folder, kind);

@@ -15,8 +15,8 @@
 
 namespace swiftlet {
 
-/// The last three are those of `swiftlet mesh`, `fuse` and `place`.
-enum class RunKind { kReplay, kFlight, kMesh, kMap, kPlaceList };
+/// The last four are those of `swiftlet mesh`, `fuse`, `place`, and `calibrate cameras` and `imu-camera`.
+enum class RunKind { kReplay, kFlight, kMesh, kMap, kPlaceList, kCalibration };
 
 inline constexpr const char* kRunMark = "swiftlet_run.txt";
 
@@ -25,6 +25,9 @@ std::optional<RunKind> runKindOf(const std::string& folder);
 
 /// InputError if a run of this kind must not be written to the folder. Changes nothing.
 void refuseRunIn(const std::string& folder, RunKind kind = RunKind::kFlight);
+
+/// Paths of the files that a claim of kind kCalibration removes from the folder.
+std::vector<std::string> calibrationFilesIn(const std::string& folder);
 
 /// A folder that belongs to one run during this object's lifetime; a flight's is not deleted to free space.
 class RunClaim {

@@ -63,3 +63,35 @@ TEST_CASE("a search that the user stops gives no calibration, and later signals 
   CHECK(endsProgram(SIGINT));
   CHECK(endsProgram(SIGTERM));
 }
+
+TEST_CASE("a refused calibration leaves no older one in its folder, and no file of the user is removed") {
+  const ScratchFolder folder("calibrate_again");
+  const std::string log = emptyLog(folder, 3);
+  const std::string rig = folder.file("rig");
+  const auto calibrate = [&] {
+    return say({"calibrate", "cameras", log, "--target", board(folder), "--out", rig});
+  };
+  { const RunClaim earlier(rig, RunKind::kCalibration, false); }
+  fs::create_directories(rig + "/cam1");
+  fs::create_directories(rig + "/imu0");
+  for (const char* name : {"/camchain.yaml", "/camchain-imucam.yaml", "/cam1/sensor.yaml",
+                           "/imu0/sensor.yaml", "/imu.yaml", "/notes.txt"}) {
+    writeWholeFile(rig + name, "earlier\n");
+  }
+  CHECK(calibrate().code == kExitFailed);
+  CHECK(fs::exists(rig + "/report.html"));
+  for (const char* name : {"/camchain.yaml", "/camchain-imucam.yaml", "/cam1", "/imu0", "/imu.yaml"}) {
+    CAPTURE(name);
+    CHECK_FALSE(fs::exists(rig + name));
+  }
+  CHECK(textOf(rig + "/notes.txt") == "earlier\n");
+
+  fs::remove(rig + "/swiftlet_run.txt");
+  fs::remove(rig + "/report.html");
+  fs::create_directories(rig + "/cam1");
+  writeWholeFile(rig + "/cam1/sensor.yaml", "of another tool\n");
+  const Said said = calibrate();
+  CHECK(said.code == kExitBadInput);
+  CHECK(contains(said.text, "holds cam1 but no mark of a calibration"));
+  CHECK(textOf(rig + "/cam1/sensor.yaml") == "of another tool\n");
+}
