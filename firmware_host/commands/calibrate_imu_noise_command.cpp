@@ -5,6 +5,7 @@
 
 #include "firmware_host/commands/calibrate_commands.hpp"
 #include "firmware_host/commands/program.hpp"
+#include "firmware_host/files/output_guard.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/calibrate/imu_noise/imu_noise_run.hpp"
 #include "firmware_host/lab/calibrate/page/solution_pages.hpp"
@@ -20,6 +21,7 @@ struct ImuNoiseOptions {
 
 int calibrateImuNoise(const ImuNoiseOptions& options) {
   const std::string page = options.out.empty() ? "" : fileBeside(options.out, ".html");
+  for (const std::string& file : {options.out, page}) refuseOutputInInput(file, {options.log});
   const ImuNoiseResult result = measureImuNoise(options.log);
   warnAll(result.warnings);
   fmt::print("{}", imuNoiseText(result));

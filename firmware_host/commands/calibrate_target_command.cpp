@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
-#include <map>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 
+#include "drivers/input/input_error.hpp"
 #include "drivers/target/target_file.hpp"
 #include "firmware_host/commands/calibrate_commands.hpp"
 #include "firmware_host/commands/program.hpp"
@@ -20,17 +22,26 @@ struct TargetOptions {
   BoardLayout layout;
 };
 
+/// A description that someone corrected after measuring the print is not written over.
+void refuseOtherBoard(const std::string& file, const std::string& text) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in || std::string(std::istreambuf_iterator<char>(in), {}) == text) return;
+  throw InputError(file, 0, "", "exists and describes another board, or was corrected by hand",
+                   "Give another name with --out, or remove this file");
+}
+
 int printTarget(TargetOptions options) {
   options.layout.kind = options.kind == "checkerboard" ? TargetKind::kCheckerboard : TargetKind::kAprilGrid;
   const Eigen::Vector2d paper = paperSize(options.paper);
   const CalibrationTarget target = boardForPaper(options.layout, paper);
   const std::string yaml = fileBeside(options.out, ".yaml");
+  refuseOtherBoard(yaml, targetYaml(target));
   writeWholeFile(options.out, boardPdf(target, paper));
   writeWholeFile(yaml, targetYaml(target));
   fmt::print(
       "{}: {}\n"
-      "{}: board description for --target. Print at 100 %, measure both rulers, and write the measured size "
-      "into this file\n",
+      "{}: board description for --target. Print at 100 %, measure the rulers and the board, and write the "
+      "measured size into this file\n",
       options.out, describe(target), yaml);
   if (!target.hasTags() && (target.columns + target.rows) % 2 == 0) {
     fmt::print(

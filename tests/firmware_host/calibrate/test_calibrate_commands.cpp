@@ -10,6 +10,7 @@
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "drivers/target/target_file.hpp"
+#include "firmware_host/files/output_guard.hpp"
 #include "firmware_host/files/run_claim.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "tests/firmware_host/said.hpp"
@@ -94,4 +95,46 @@ TEST_CASE("a refused calibration leaves no older one in its folder, and no file 
   CHECK(said.code == kExitBadInput);
   CHECK(contains(said.text, "holds cam1 but no mark of a calibration"));
   CHECK(textOf(rig + "/cam1/sensor.yaml") == "of another tool\n");
+}
+
+TEST_CASE("calibrate does not write over what it reads") {
+  const ScratchFolder folder("calibrate_inputs");
+  const std::string log = emptyLog(folder, 3);
+  const std::string target = board(folder);
+  const std::string noise = folder.file("rig/imu.yaml");
+  fs::create_directories(folder.file("rig"));
+  writeWholeFile(noise, "rate_hz: 200\n");
+  for (const std::string& out : {log, log + "/cam0/", log + "/rig"}) {
+    CAPTURE(out);
+    const Said said = say({"calibrate", "cameras", log, "--target", target, "--out", out});
+    CHECK(said.code == kExitBadInput);
+    CHECK(contains(said.text, "the input"));
+  }
+  const Said said =
+      say({"calibrate", "imu-camera", log, "--target", target, "--imu", noise, "--out", folder.file("rig")});
+  CHECK(said.code == kExitBadInput);
+  CHECK(contains(said.text, "would overwrite the input"));
+  CHECK(textOf(noise) == "rate_hz: 200\n");
+
+  writeWholeFile(folder.file("data.csv"), "1,2,3\n");
+  CHECK(say({"calibrate", "imu-noise", folder.file("data.csv"), "--out", folder.file("data.csv")}).code ==
+        kExitBadInput);
+  CHECK(textOf(folder.file("data.csv")) == "1,2,3\n");
+
+  fs::create_directory_symlink(log, folder.file("link"));
+  CHECK_THROWS_AS(refuseOutputInInput(folder.file("link/x.yaml"), {log}), InputError);
+  CHECK_NOTHROW(refuseOutputInInput(folder.file("log2"), {log, ""}));
+}
+
+TEST_CASE("a board description that was corrected stays") {
+  const ScratchFolder folder("calibrate_target");
+  const std::string pdf = folder.file("board.pdf");
+  CHECK(run({"calibrate", "target", "--out", pdf}) == kExitDone);
+  CHECK(run({"calibrate", "target", "--out", pdf}) == kExitDone);
+  const std::string corrected = textOf(folder.file("board.yaml")) + "# measured\n";
+  writeWholeFile(folder.file("board.yaml"), corrected);
+  const Said said = say({"calibrate", "target", "--out", pdf});
+  CHECK(said.code == kExitBadInput);
+  CHECK(contains(said.text, "corrected by hand"));
+  CHECK(textOf(folder.file("board.yaml")) == corrected);
 }
