@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/lab/calibrate/board/same_moment.hpp"
 #include "firmware_host/lab/calibrate/cameras/board_pose.hpp"
 #include "firmware_host/lab/calibrate/cameras/lens_start.hpp"
 
@@ -186,11 +187,13 @@ CameraSolution calibrateCameras(const CameraInput& input, const std::function<vo
     const std::optional<SE3> T = firstTransform(input, moments.all, bundle.lens, kFarOff * worst);
     if (!T) {
       solution.reasons.push_back(
-          moments.stamp_difference > 0
+          moments.stamp_difference > kSameMoment
               ? fmt::format("The cameras' images are {:.1f} ms apart, so no pair shows the board at one "
                             "time. Trigger the cameras together, or correct their stamps",
                             moments.stamp_difference * 1e3)
-              : "No image pair shows the board to both cameras. Hold it where their images overlap");
+              : fmt::format("Fewer than {} image pairs show the board to both cameras. Hold it where their "
+                            "images overlap",
+                            kFewestPairs));
       return solution;
     }
     bundle.T_cam1_cam0 = *T;

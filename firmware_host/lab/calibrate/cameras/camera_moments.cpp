@@ -61,6 +61,41 @@ std::optional<SE3> poseOf(const CalibrationTarget& target, const Moment& moment,
   return std::nullopt;
 }
 
+std::vector<Stamp> stampsOf(const std::vector<BoardView>& views, std::size_t camera) {
+  std::vector<Stamp> stamps;
+  for (const BoardView& view : views) {
+    if (view.camera == camera) stamps.push_back(view.stamp);
+  }
+  std::sort(stamps.begin(), stamps.end());
+  return stamps;
+}
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// s, median. From all images, with and without the board. Differences above half the image period are those
+/// of images without a partner: one that was lost, or left out because it does not show the board.
+double stampDifference(const std::vector<BoardView>& views) {
+  const std::vector<Stamp> first = stampsOf(views, 0);
+  const std::vector<Stamp> second = stampsOf(views, 1);
+  if (second.empty()) return 0;
+  std::vector<double> periods;
+  for (std::size_t i = 1; i < first.size(); ++i) periods.push_back((first[i] - first[i - 1]).seconds());
+  const double half = 0.5 * medianOf(periods);
+  std::vector<double> differences;
+  std::size_t nearest = 0;
+  for (const Stamp stamp : first) {
+    const auto apart = [&](std::size_t i) { return std::abs((second[i] - stamp).seconds()); };
+    while (nearest + 1 < second.size() && apart(nearest + 1) <= apart(nearest)) ++nearest;
+    if (apart(nearest) <= half) differences.push_back(apart(nearest));
+  }
+  return medianOf(std::move(differences));
+}
+
 }  // namespace
 
 Moments pairViews(const std::vector<BoardView>& views, std::size_t camera_count) {
@@ -71,16 +106,12 @@ Moments pairViews(const std::vector<BoardView>& views, std::size_t camera_count)
   const auto earlier = [](const BoardView* a, const BoardView* b) { return a->stamp < b->stamp; };
   for (auto& list : of) std::stable_sort(list.begin(), list.end(), earlier);
   Moments moments;
-  std::vector<double> differences;
   std::size_t second = 0;
   for (const BoardView* first : of[0]) {
     Moment moment{first->stamp, {first, nullptr}};
     const auto apart = [&](std::size_t i) { return std::abs((of[1][i]->stamp - first->stamp).seconds()); };
     while (second + 1 < of[1].size() && apart(second + 1) <= apart(second)) ++second;
-    if (second < of[1].size()) {
-      differences.push_back(apart(second));
-      if (apart(second) <= kSameMoment) moment.seen[1] = of[1][second];
-    }
+    if (second < of[1].size() && apart(second) <= kSameMoment) moment.seen[1] = of[1][second];
     moments.all.push_back(moment);
   }
   std::vector<const BoardView*> paired;
@@ -92,10 +123,7 @@ Moments pairViews(const std::vector<BoardView>& views, std::size_t camera_count)
   }
   std::stable_sort(moments.all.begin(), moments.all.end(),
                    [](const Moment& a, const Moment& b) { return a.stamp < b.stamp; });
-  if (!differences.empty()) {
-    std::sort(differences.begin(), differences.end());
-    moments.stamp_difference = differences[differences.size() / 2];
-  }
+  if (camera_count > 1) moments.stamp_difference = stampDifference(views);
   return moments;
 }
 

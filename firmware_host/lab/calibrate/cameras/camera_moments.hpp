@@ -20,8 +20,8 @@ struct Moment {
 
 struct Moments {
   std::vector<Moment> all;  ///< by stamp
-  /// s, median over the images of camera 0 with an image of camera 1 in the same frame interval; 0: one
-  /// camera.
+  /// s, median over the images of camera 0 with an image of camera 1 less than half the image period away;
+  /// 0: none.
   double stamp_difference = 0;
 };
 
