@@ -16,6 +16,7 @@
 #include "tests/firmware_host/calibrate/board_image.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/support/skip_case.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet;
 
@@ -78,4 +79,26 @@ TEST_CASE("a paper that is none, and a board too fine, are refused") {
   CHECK_THROWS_AS(paperSize("20x10"), InputError);
   CHECK(paperSize("300x500").isApprox(Eigen::Vector2d(0.5, 0.3)));
   CHECK_THROWS_AS(boardForPaper({TargetKind::kAprilGrid, 100, 60}, paperSize("A4")), InputError);
+  CHECK_THROWS_WITH(boardForPaper({TargetKind::kAprilGrid, 30, 30}, paperSize("A0")), Catch::Contains("587"));
+  CHECK(boardForPaper({TargetKind::kAprilGrid, 29, 20}, paperSize("A0")).cornerCount() == 4 * 580);
+}
+
+TEST_CASE("a sheet names the rulers that it has") {
+  if (std::system("command -v pdftotext > /dev/null") != 0) {
+    skipCase("pdftotext (package poppler-utils) is not installed", "apt-get install poppler-utils");
+    return;
+  }
+  const auto wordsOf = [](const std::string& paper) {
+    const ScratchFolder folder("board_words");
+    const CalibrationTarget target = boardForPaper({TargetKind::kAprilGrid, 3, 3}, paperSize(paper));
+    writeWholeFile(folder.file("board.pdf"), boardPdf(target, paperSize(paper)));
+    const std::string read = "pdftotext " + folder.file("board.pdf") + " " + folder.file("board.txt");
+    REQUIRE(std::system(read.c_str()) == 0);
+    return test::textOf(folder.file("board.txt"));
+  };
+  CHECK(wordsOf("A4").find("Both rulers are") != std::string::npos);
+  CHECK(wordsOf("200x100").find("The ruler is") != std::string::npos);
+  const std::string small = wordsOf("80x80");
+  CHECK(small.find("ruler") == std::string::npos);
+  CHECK(small.find("AprilGrid of 3 x 3 tags") != std::string::npos);
 }

@@ -99,6 +99,12 @@ CalibrationTarget boardForPaper(const BoardLayout& layout, const Eigen::Vector2d
     if (target.columns == 0) {
       target.columns = static_cast<int>(std::lround(target.rows * free.x() / free.y()));
     }
+    if (target.columns * target.rows > kTagCount) {
+      throw InputError("--columns", 0, "",
+                       fmt::format("{} x {} tags are more than the {} that tag36h11 has", target.columns,
+                                   target.rows, kTagCount),
+                       "Use fewer columns and rows");
+    }
     // Tags, the gaps between and the squares around them, and a frame as wide as these.
     const auto edges = [](int count) { return count + kDefaultGap * (count + 3); };
     target.size = std::min(free.x() / edges(target.columns), free.y() / edges(target.rows));
@@ -138,14 +144,23 @@ std::string boardPdf(const CalibrationTarget& target, const Eigen::Vector2d& pap
   HPDF_Page_Fill(page);
   const double edge = kPrinterMargin + 0.004;
   HPDF_Page_SetLineWidth(page, 0.4F);
-  if (paper.x() > kRuler + 4 * edge) ruler(page, {2 * edge, edge}, false);
-  if (paper.y() > kRuler + 4 * edge) ruler(page, {edge, 2 * edge}, true);
-  HPDF_Page_Stroke(page);
+  const bool below = paper.x() > kRuler + 4 * edge;
+  const bool beside = paper.y() > kRuler + 4 * edge;
+  if (below) ruler(page, {2 * edge, edge}, false);
+  if (beside) ruler(page, {edge, 2 * edge}, true);
+  if (below || beside) HPDF_Page_Stroke(page);  // without a path it is an error
+  const std::string rulers = below && beside ? "Both rulers are 100 mm long. "
+                             : below         ? "The ruler is 100 mm long. "
+                                             : "";
+  const std::string words = rulers + describe(target) + ". Print at 100 %, glue to a flat plate.";
+  const float left = points(below ? 2 * edge + kRuler + 0.004 : 2 * edge);
   HPDF_Page_BeginText(page);
-  HPDF_Page_SetFontAndSize(page, HPDF_GetFont(document.get(), "Helvetica", nullptr), kTextSize);
-  const std::string words =
-      "Both rulers are 100 mm long. " + describe(target) + ". Print at 100 %, glue to a flat plate.";
-  HPDF_Page_TextOut(page, points(2 * edge + kRuler + 0.004), points(edge - 0.002), words.c_str());
+  const HPDF_Font font = HPDF_GetFont(document.get(), "Helvetica", nullptr);
+  HPDF_Page_SetFontAndSize(page, font, kTextSize);
+  const float room = points(paper.x() - kPrinterMargin) - left;
+  const float width = HPDF_Page_TextWidth(page, words.c_str());
+  if (width > room) HPDF_Page_SetFontAndSize(page, font, kTextSize * room / width);
+  HPDF_Page_TextOut(page, left, points(edge - 0.002), words.c_str());
   HPDF_Page_EndText(page);
   HPDF_SaveToStream(document.get());
   std::string bytes(HPDF_GetStreamSize(document.get()), '\0');
