@@ -68,6 +68,13 @@ TEST_CASE("a rig that never rolled is named") {
   CHECK(isNamed(calibrateImuCamera(batchInput(faultySession(settings))), "roll"));
 }
 
+TEST_CASE("images that are too far apart are named") {
+  SessionSettings settings = shortSettings();
+  settings.duration = 40;
+  settings.camera_rate = 4;
+  CHECK(isNamed(calibrateImuCamera(batchInput(faultySession(settings))), "250 ms apart"));
+}
+
 TEST_CASE("too few views are named") {
   ImuCameraInput input = batchInput(faultySession(shortSettings()));
   input.views.resize(60);

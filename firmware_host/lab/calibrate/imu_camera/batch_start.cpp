@@ -62,6 +62,15 @@ std::vector<CameraTurn> turnsOf(const std::vector<TimedPose>& poses) {
   return turns;
 }
 
+/// s, median.
+double spacingOf(const std::vector<TimedPose>& poses) {
+  std::vector<double> spacings;
+  for (std::size_t k = 1; k < poses.size(); ++k) spacings.push_back(poses[k].time - poses[k - 1].time);
+  const auto middle = spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2);
+  std::nth_element(spacings.begin(), middle, spacings.end());
+  return *middle;
+}
+
 SE3 poseAt(const std::vector<TimedPose>& poses, double time) {
   const auto next = std::lower_bound(poses.begin(), poses.end(), time,
                                      [](const TimedPose& p, double t) { return p.time < t; });
@@ -121,6 +130,13 @@ BatchStart startBatch(const CalibrationTarget& target, const std::vector<BoardVi
     start.reasons.push_back(fmt::format(
         "Only {} images show enough of the board, {} are required. Keep the board in view for half a minute.",
         poses.size(), kFewestPoses));
+    return start;
+  }
+  if (const double spacing_of_images = spacingOf(poses); spacing_of_images >= kLongestTurn) {
+    start.reasons.push_back(
+        fmt::format("Images with the board are {:.0f} ms apart, too far to follow the rotation between them. "
+                    "Record at 5 Hz or more, with the board in view.",
+                    1e3 * spacing_of_images));
     return start;
   }
   const GyroIntegral gyro(samples, start.origin);
