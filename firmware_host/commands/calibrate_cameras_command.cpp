@@ -27,15 +27,17 @@ int calibrateLogCameras(CamerasOptions options) {
   if (!log) return kExitFailed;
   const CameraSolution solution = fitCameras(options, *log, options.baseline_mm * 1e-3);
   fmt::print("{}", describe(solution));
+  const CalibrationPage content = cameraPage(solution, options.log.target, options.log.log);
   std::optional<RunClaim> claim;
   if (!options.out.empty()) {
     // Also for a bad calibration: the page shows the reason, and no older calibration stays beside it.
     claim.emplace(options.out, RunKind::kCalibration, false);
     const std::string page = (std::filesystem::path(options.out) / "report.html").string();
-    writeCalibrationPage(page, cameraPage(solution, options.log.target, options.log.log));
+    writeCalibrationPage(page, content);
     fmt::print("page written to {}\n", page);
   }
   if (!solution.reasons.empty()) return refuseCalibration(solution.reasons);
+  fmt::print("{}\n", content.verdict_text);
   if (options.out.empty()) return kExitDone;
   const std::string file = (std::filesystem::path(options.out) / "camchain.yaml").string();
   writeWholeFile(file, camchainYaml(solution));

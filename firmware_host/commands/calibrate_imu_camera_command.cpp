@@ -94,12 +94,12 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   }
   // Also for a bad calibration: the page shows the reason, and no older calibration stays beside it.
   const RunClaim claim(options.out, RunKind::kCalibration, false);
-  writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(),
-                       lenses ? imuCameraPage(solution, input.target, options.log.log)
-                              : cameraPage(input.cameras, input.target, options.log.log));
+  const CalibrationPage page = lenses ? imuCameraPage(solution, input.target, options.log.log)
+                                      : cameraPage(input.cameras, input.target, options.log.log);
+  writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(), page);
   if (!solution.reasons.empty()) return refuseCalibration(solution.reasons);
   writeCalibration(options.out, calibrationOf(solution, input.noise));
-  fmt::print("good; written to {}\n", options.out);
+  fmt::print("{}\nwritten to {}\n", page.verdict_text, options.out);
   return kExitDone;
 }
 
