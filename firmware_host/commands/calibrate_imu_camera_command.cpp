@@ -46,6 +46,25 @@ CameraSolution camerasOf(const CameraChain& chain, const LogViews& log, const st
   return solution;
 }
 
+bool hasLenses(const CameraSolution& cameras) {
+  return cameras.camera_count > 0 && cameras.camera[0].model.width() > 0;
+}
+
+/// Adds the reasons of the camera step. Printed only: those that a rolling shutter explains, which that step
+/// does not model, and those for which it found no lens where --cameras gave one.
+void addReasonsOf(const CameraSolution& cameras, ImuCameraSolution& solution) {
+  const bool replaced = !hasLenses(cameras) && solution.rig.camera_count > 0;
+  for (const std::string& reason : cameras.reasons) {
+    const std::vector<std::string>& rolling = cameras.rolling_reasons;
+    const bool rolls = solution.rig.rolls() && std::ranges::find(rolling, reason) != rolling.end();
+    if (rolls || replaced) {
+      fmt::print("cameras alone{}: {}\n", rolls ? ", without rolling shutter" : "", reason);
+    } else {
+      solution.reasons.push_back(reason);
+    }
+  }
+}
+
 int calibrateLogImuCamera(ImuCameraOptions options) {
   options.checkOut({options.cameras, options.imu});
   ImuCameraInput input;
@@ -65,25 +84,20 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   input.target = options.log.target;
   input.samples = std::move(log.samples);
   input.noise.rate_hz = medianRate(input.samples);
-  input.cameras = chain ? camerasOf(*chain, log, options.cameras) : fitCameras(options, log, 0);
+  if (chain) log.camera_count = std::min(log.camera_count, chain->rig.camera_count);
+  // With --cameras too: the lenses are estimated again from this log, whose faults this step finds.
+  const CameraSolution cameras = fitCameras(options, log, 0);
+  input.cameras = chain ? camerasOf(*chain, log, options.cameras) : cameras;
   if (chain && chain->has_imu) input.told = chain->rig;
   input.views = std::move(log.views);
-  const bool lenses = input.cameras.camera_count > 0 && input.cameras.camera[0].model.width() > 0;
+  const bool lenses = hasLenses(input.cameras);
   ImuCameraSolution solution;
   if (lenses) {
     solution = withProgress("fitting cameras and IMU",
                             [&](const auto& progress) { return calibrateImuCamera(input, progress); });
   }
   fmt::print("{}", describe(solution));
-  // Without a rolling-shutter model, the camera-only step objects to errors that the batch explains.
-  const bool cameras_count = !lenses || !solution.rig.rolls();
-  for (const std::string& reason : input.cameras.reasons) {
-    if (cameras_count) {
-      solution.reasons.push_back(reason);
-    } else {
-      fmt::print("cameras only, without rolling shutter: {}\n", reason);
-    }
-  }
+  addReasonsOf(cameras, solution);
   if (!input.noise_told) {
     fmt::print("noise: random walks of a typical MEMS IMU, densities from the residuals (no --imu given)\n");
     input.noise.gyro_density *= solution.gyro_sigma;
@@ -95,7 +109,7 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   // Also for a bad calibration: the page shows the reason, and no older calibration stays beside it.
   const RunClaim claim(options.out, RunKind::kCalibration, false);
   const CalibrationPage page = lenses ? imuCameraPage(solution, input.target, options.log.log)
-                                      : cameraPage(input.cameras, input.target, options.log.log);
+                                      : cameraPage(cameras, input.target, options.log.log);
   writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(), page);
   if (!solution.reasons.empty()) return refuseCalibration(solution.reasons);
   writeCalibration(options.out, calibrationOf(solution, input.noise));

@@ -124,3 +124,16 @@ TEST_CASE("a board that camera 1 sees in few of camera 0's images is no fault of
   CHECK(all.find("apart") == std::string::npos);
   CHECK((all.find("image pairs show the board to both cameras") == std::string::npos) == ever);
 }
+
+TEST_CASE("a rolling shutter gives no reasons but those that it is known to explain") {
+  for (const std::uint64_t seed : {904U, 905U}) {
+    CalibrationRig rig = globalShutterRig(seed);
+    rig.rig.readout = Duration::fromSeconds(0.02);
+    const CameraSolution solution = calibrateCameras(sessionInput(rig, {}, shortSession(seed)));
+    std::string all;
+    for (const std::string& reason : solution.reasons) all += reason + "\n";
+    CAPTURE(seed, all);
+    CHECK_FALSE(solution.reasons.empty());
+    CHECK(solution.reasons == solution.rolling_reasons);
+  }
+}

@@ -226,7 +226,7 @@ CameraSolution calibrateCameras(const CameraInput& input, const std::function<vo
         "Half of the views is too few for a second solution to compare with. Record the board from more "
         "sides");
   }
-  for (std::string& reason : cameraReasons(solution, evidence)) solution.reasons.push_back(std::move(reason));
+  addCameraReasons(evidence, solution);
   say(1);
   return solution;
 }

@@ -56,7 +56,6 @@ struct CameraEvidence {
   std::array<Eigen::Matrix<double, 8, 8>, kMaxCameras> half_covariance{};  ///< of one half
 };
 
-[[nodiscard]] std::vector<std::string> cameraReasons(const CameraSolution& solution,
-                                                     const CameraEvidence& evidence);
+void addCameraReasons(const CameraEvidence& evidence, CameraSolution& solution);
 
 }  // namespace swiftlet

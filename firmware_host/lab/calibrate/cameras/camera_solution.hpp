@@ -57,3 +57,5 @@ struct CameraSolution {
 };
 
 }  // namespace swiftlet
+  /// Those of `reasons` that a rolling shutter explains too: it is not modelled here.
+  std::vector<std::string> rolling_reasons;

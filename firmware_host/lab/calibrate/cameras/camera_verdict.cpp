@@ -68,8 +68,18 @@ bool isLarge(const Stretch& stretch) {
   return std::abs(stretch.value) > kMostStretch && std::abs(stretch.value) > kStretchSigmas * stretch.sigma;
 }
 
-void judgeBoard(const CameraSolution& solution, const CameraEvidence& evidence,
-                std::vector<std::string>& reasons) {
+struct Reasons {
+  std::vector<std::string> all;
+  std::vector<std::string> of_rolling;  ///< those that a rolling shutter explains too
+
+  void push_back(std::string reason) { all.push_back(std::move(reason)); }
+  void pushRolling(const std::string& reason) {
+    all.push_back(reason);
+    of_rolling.push_back(reason);
+  }
+};
+
+void judgeBoard(const CameraSolution& solution, const CameraEvidence& evidence, Reasons& reasons) {
   const CalibrationTarget& target = evidence.input->target;
   const Stretch height = stretchOf(*evidence.bundle, solution.corner_sigma,
                                    [](BundleCorner& corner, double part) { corner.point.y() *= 1 + part; });
@@ -96,7 +106,7 @@ void judgeBoard(const CameraSolution& solution, const CameraEvidence& evidence,
 }
 
 void judgeCamera(std::size_t c, const CameraSolution& solution, const CameraEvidence& evidence,
-                 std::vector<std::string>& reasons) {
+                 Reasons& reasons) {
   const SolvedCamera& camera = solution.camera[c];
   const double focal = camera.model.focal();
   std::vector<bool> seen(solution.views.size(), false);
@@ -118,7 +128,7 @@ void judgeCamera(std::size_t c, const CameraSolution& solution, const CameraEvid
                     c, sigma, kImagePart * 100, kMostProjectionSigma * focal));
   }
   if (camera.rms > kMostCornerSigma * focal) {
-    reasons.push_back(fmt::format(
+    reasons.pushRolling(fmt::format(
         "Camera {}: corner residuals are {:.2f} px, above {:.2f} px. Check that the image is sharp and that "
         "the board is flat and matches its file; hold a rolling shutter camera still for each image",
         c, camera.rms, kMostCornerSigma * focal));
@@ -126,15 +136,14 @@ void judgeCamera(std::size_t c, const CameraSolution& solution, const CameraEvid
   const std::vector<ImagePoint> difference = projectionDifference(camera.halves[0], camera.halves[1]);
   const double expected = rms(projectionSigmas(camera.model, evidence.half_covariance[c]));
   if (rms(difference) > kMostHalfRatio * expected && rms(difference) > kLeastHalfDifference * focal) {
-    reasons.push_back(fmt::format(
+    reasons.pushRolling(fmt::format(
         "Camera {}: two halves of the views give lenses that differ by {:.2f} px rms, {:.1f} times what "
         "noise explains. The lens moved or refocused, the board is bent, or the shutter is rolling",
         c, rms(difference), rms(difference) / expected));
   }
 }
 
-void judgePair(const CameraSolution& solution, const CameraEvidence& evidence,
-               std::vector<std::string>& reasons) {
+void judgePair(const CameraSolution& solution, const CameraEvidence& evidence, Reasons& reasons) {
   const auto [low, high] = std::minmax(evidence.alone_sigma[0], evidence.alone_sigma[1]);
   if (high > kMostSigmaRatio * low) {
     const int blurred = evidence.alone_sigma[0] > evidence.alone_sigma[1] ? 0 : 1;
@@ -150,7 +159,7 @@ void judgePair(const CameraSolution& solution, const CameraEvidence& evidence,
                     high, solution.corner_sigma));
   }
   if (evidence.stamp_difference > kMostStampDifference) {
-    reasons.push_back(
+    reasons.pushRolling(
         fmt::format("The stamps of the two cameras are {:.2f} ms apart. Trigger the cameras together",
                     evidence.stamp_difference * 1e3));
   }
@@ -166,8 +175,8 @@ void judgePair(const CameraSolution& solution, const CameraEvidence& evidence,
 
 }  // namespace
 
-std::vector<std::string> cameraReasons(const CameraSolution& solution, const CameraEvidence& evidence) {
-  std::vector<std::string> reasons;
+void addCameraReasons(const CameraEvidence& evidence, CameraSolution& solution) {
+  Reasons reasons;
   for (std::size_t c = 0; c < solution.camera_count; ++c) judgeCamera(c, solution, evidence, reasons);
   if (solution.camera_count == 2) judgePair(solution, evidence, reasons);
   const auto outliers = std::count_if(solution.corners.begin(), solution.corners.end(),
@@ -175,13 +184,14 @@ std::vector<std::string> cameraReasons(const CameraSolution& solution, const Cam
   const double part =
       static_cast<double>(outliers) / static_cast<double>(std::max<std::size_t>(1, solution.corners.size()));
   if (part > kMostOutliers) {
-    reasons.push_back(
+    reasons.pushRolling(
         fmt::format("{:.1f} % of the corners were rejected as outliers, above {:.0f} %. Check for "
                     "reflections, a second board and motion blur",
                     part * 100, kMostOutliers * 100));
   }
   judgeBoard(solution, evidence, reasons);
-  return reasons;
+  for (std::string& reason : reasons.all) solution.reasons.push_back(std::move(reason));
+  solution.rolling_reasons = std::move(reasons.of_rolling);
 }
 
 }  // namespace swiftlet
