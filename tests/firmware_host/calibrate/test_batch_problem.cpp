@@ -29,6 +29,20 @@ Eigen::VectorXd randomStep(Random& random, int size, double scale) {
   return step;
 }
 
+TEST_CASE("a step gains nothing by a corner that the lens can no longer project") {
+  const BatchStart start = startOf(batchInput(sessionOf(204, 12)));
+  REQUIRE(start.reasons.empty());
+  const bool robust = GENERATE(false, true);
+  const auto costOf = [&](const BatchData& data) {
+    const BatchProblem problem(data, start.state, {});
+    ArrowSystem system = problem.emptySystem();
+    return problem.assemble(system, robust);
+  };
+  BatchData lost = start.data;
+  lost.views[lost.views.size() / 2].corners.front().point = {0, 0, 100};  // behind the camera
+  CHECK(costOf(lost) > costOf(start.data));
+}
+
 TEST_CASE("an arrow system is solved as its dense matrix is") {
   Random random(20, 1);
   constexpr int kChain = 30;

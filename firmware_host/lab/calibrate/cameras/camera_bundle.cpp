@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/lab/calibrate/cameras/camera_solution.hpp"
 #include "firmware_host/lab/calibrate/cameras/lens_jacobian.hpp"
 
 namespace swiftlet {
@@ -15,7 +16,6 @@ constexpr int kMostSteps = 60;
 constexpr double kSmallestGain = 1e-9;  ///< relative decrease of the cost that ends the solution
 constexpr double kMostDamping = 1e8;
 constexpr double kOutlierSigmas = 4;  ///< over two axes: exceeded by chance once in 3000 corners
-constexpr double kNoPixel = 100;      ///< px, residual of a corner that the lens cannot project
 constexpr int kMostRounds = 12;
 constexpr std::size_t kFewestUsed = 6;  ///< corners of a view
 /// Median length of two normal axes, in sigmas.

@@ -17,6 +17,9 @@ namespace swiftlet {
 /// px: corners of one detector share errors of some hundredths, which residuals do not show.
 inline constexpr double kLeastCornerSigma = 0.02;
 
+/// px: residual of a corner that the lens cannot project, so that losing a corner never improves a step.
+inline constexpr double kNoPixel = 100;
+
 /// A corner that was used, or removed as an outlier.
 struct CornerResidual {
   std::size_t camera = 0;
@@ -54,8 +57,8 @@ struct CameraSolution {
   std::vector<CornerResidual> corners;
   /// Why this cannot be trusted, one sentence each with its remedy; empty: good.
   std::vector<std::string> reasons;
+  /// Those of `reasons` that a rolling shutter explains too: it is not modelled here.
+  std::vector<std::string> rolling_reasons;
 };
 
 }  // namespace swiftlet
-  /// Those of `reasons` that a rolling shutter explains too: it is not modelled here.
-  std::vector<std::string> rolling_reasons;

@@ -7,6 +7,7 @@
 
 #include "estimator/core/random.hpp"
 #include "estimator/geometry/so3.hpp"
+#include "firmware_host/lab/calibrate/cameras/camera_solution.hpp"
 
 namespace swiftlet {
 namespace {
@@ -211,7 +212,11 @@ void BatchProblem::addView(const SeenView& view, Sum& sum) const {
     const Eigen::Vector3d p_cam = R_cam_body * (p_body - T_body_cam.translation);
     Eigen::Vector2d predicted;
     Matrix23d by_point;
-    if (!lens.project(p_cam, predicted, &by_point)) continue;
+    if (!lens.project(p_cam, predicted, &by_point)) {
+      const double lost = kNoPixel / noise_.corner;
+      sum.cost += sum.robust ? kHuber * lost : lost * lost;
+      continue;
+    }
     const Eigen::Vector2d left = (corner.pixel - predicted) / noise_.corner;
     double weight = 1 / noise_.corner;
     double factor = 1;
@@ -462,7 +467,7 @@ bool BatchProblem::solve(int iterations, bool robust, double settled) {
     trial.state_ = moved(step);
     ArrowSystem next = emptySystem();
     const double next_cost = trial.assemble(next, robust);
-    // Corners that the lens can no longer project leave the sum, so a slight increase is no failure.
+    // Corners that leave the spline's time leave the sum, so a slight increase is no failure.
     if (std::isfinite(next_cost) && next_cost <= cost * (1 + 1e-9)) {
       state_ = std::move(trial.state_);
       cost = next_cost;

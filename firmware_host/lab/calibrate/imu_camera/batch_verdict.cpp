@@ -188,9 +188,10 @@ ImuCameraSolution BatchVerdict::solutionOf(const BatchProblem& problem) const {
       solution.views.push_back({stamp, (state.spline.pose(time) * state.T_body_cam[0]).inverse()});
     }
     for (const SeenCorner& corner : view.corners) {
-      CornerResidual seen{view.camera,   solution.views.size() - 1, corner.id, corner.pixel, {},
-                          corner.outlier};
-      if (problem.residual(view, corner, seen.residual)) solution.corners.push_back(seen);
+      CornerResidual seen{view.camera,  solution.views.size() - 1, corner.id,
+                          corner.pixel, Eigen::Vector2d::Zero(),   corner.outlier};
+      // One that the lens cannot project is an outlier without a residual.
+      if (problem.residual(view, corner, seen.residual) || corner.outlier) solution.corners.push_back(seen);
     }
   }
   return solution;

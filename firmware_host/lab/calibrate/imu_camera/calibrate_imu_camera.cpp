@@ -28,7 +28,8 @@ constexpr int kSteps = 12;
 constexpr double kRoughly = 1;  // squared sigmas that a further step would gain
 constexpr double kSettled = 1e-4;
 
-/// Marks corners beyond four sigma, by the median of the residuals. Returns the number of outliers.
+/// Marks corners beyond four sigma, by the median of the residuals, and those that the lens cannot project.
+/// Returns the number of outliers.
 std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& sigma) {
   std::vector<double> sizes;
   for (const SeenView& view : data.views) {
@@ -48,8 +49,9 @@ std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& s
   for (SeenView& view : data.views) {
     for (SeenCorner& corner : view.corners) {
       Eigen::Vector2d r;
-      if (!problem.residual(view, corner, r)) continue;
-      corner.outlier = r.cwiseAbs().maxCoeff() > kOutlierSigmas * sigma;
+      const bool has_pixel = problem.residual(view, corner, r);
+      if (!has_pixel && !problem.covers(problem.seconds(view, corner))) continue;
+      corner.outlier = !has_pixel || r.cwiseAbs().maxCoeff() > kOutlierSigmas * sigma;
       outliers += corner.outlier ? 1 : 0;
     }
   }
