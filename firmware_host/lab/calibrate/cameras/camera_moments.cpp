@@ -70,7 +70,7 @@ std::vector<Stamp> stampsOf(const std::vector<BoardView>& views, std::size_t cam
   return stamps;
 }
 
-double medianOf(std::vector<double> values) {
+double medianSeconds(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -85,7 +85,7 @@ double stampDifference(const std::vector<BoardView>& views) {
   if (second.empty()) return 0;
   std::vector<double> periods;
   for (std::size_t i = 1; i < first.size(); ++i) periods.push_back((first[i] - first[i - 1]).seconds());
-  const double half = 0.5 * medianOf(periods);
+  const double half = 0.5 * medianSeconds(periods);
   std::vector<double> differences;
   std::size_t nearest = 0;
   for (const Stamp stamp : first) {
@@ -93,7 +93,7 @@ double stampDifference(const std::vector<BoardView>& views) {
     while (nearest + 1 < second.size() && apart(nearest + 1) <= apart(nearest)) ++nearest;
     if (apart(nearest) <= half) differences.push_back(apart(nearest));
   }
-  return medianOf(std::move(differences));
+  return medianSeconds(std::move(differences));
 }
 
 }  // namespace
