@@ -66,6 +66,22 @@ TEST_CASE("Uncertainty of a pixel is that of sampled lenses after the best rotat
   CHECK(told[pixels.size() / 2] < 0.05);
 }
 
+TEST_CASE("Where the distortion of a pinhole folds inside the image, its lens is unknown") {
+  const Vector8d sigma = lensSigmas();
+  const Eigen::Matrix<double, 8, 8> covariance = sigma.cwiseAbs2().asDiagonal().toDenseMatrix();
+  const auto folded = [](CameraKind kind) {
+    return CameraModel(kind, 752, 480, {300, 300, 376, 240}, {-0.5, 0, 0, 0});
+  };
+  const CameraModel pinhole = folded(CameraKind::kPinholeRadtan);
+  CHECK(rayShare(pinhole) == Approx(0.23).margin(0.03));
+  CHECK(std::isinf(quantile(projectionSigmas(pinhole, covariance), 0.95)));
+  CHECK(std::isfinite(rms(projectionSigmas(pinhole, covariance))));
+  // The corners of a fisheye's image are dark.
+  const CameraModel fisheye = folded(CameraKind::kEquidistant);
+  CHECK(rayShare(fisheye) < 0.5);
+  CHECK(std::isfinite(quantile(projectionSigmas(fisheye, covariance), 0.95)));
+}
+
 TEST_CASE("A turned camera is no difference between lenses, a longer focal length is") {
   const std::vector<Eigen::Vector2d> pixels = somePixels();
   const std::vector<bool> all(pixels.size(), true);

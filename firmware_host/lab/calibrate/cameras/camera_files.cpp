@@ -36,6 +36,9 @@ std::string describe(const CameraSolution& solution) {
         "of the image); solutions from halves of the views differ by {:.3f} px rms\n",
         camera.rms, quantile(projectionSigmas(camera.model, camera.covariance), kShownPart), kShownPart * 100,
         rms(projectionDifference(camera.halves[0], camera.halves[1])));
+    if (const double rays = rayShare(camera.model); rays < 1) {
+      text += fmt::format("  {:.0f} % of the image has no ray in this model\n", 100 * (1 - rays));
+    }
   }
   if (solution.camera_count == 2 && !solution.views.empty()) {
     const Eigen::Matrix<double, 6, 1> sigma = solution.stereo_covariance.diagonal().cwiseSqrt();

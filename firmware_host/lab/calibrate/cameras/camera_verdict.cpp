@@ -120,7 +120,12 @@ void judgeCamera(std::size_t c, const CameraSolution& solution, const CameraEvid
         kFewestGoodViews));
   }
   const double sigma = quantile(projectionSigmas(camera.model, camera.covariance), kImagePart);
-  if (!(sigma < kMostProjectionSigma * focal)) {
+  if (!std::isfinite(sigma)) {
+    reasons.push_back(fmt::format(
+        "Camera {}: the distortion folds inside the image, so {:.0f} % of it has no ray. Bring the "
+        "board close and into every corner of the image",
+        c, (1 - rayShare(camera.model)) * 100));
+  } else if (!(sigma < kMostProjectionSigma * focal)) {
     reasons.push_back(
         fmt::format("Camera {}: a projected pixel is uncertain by up to {:.2f} px (1 sigma, in {:.0f} % of "
                     "the image), above {:.2f} px. Bring the board close and into every corner of the image, "
@@ -153,13 +158,13 @@ void judgePair(const CameraSolution& solution, const CameraEvidence& evidence, R
                     blurred, high / low));
   }
   if (solution.corner_sigma > kMostJointRatio * high) {
-    reasons.push_back(
+    reasons.pushRolling(
         fmt::format("The two cameras fit the board to {:.2f} px separately but only to {:.2f} px together: "
                     "they are loose, or their images are not taken at the same time",
                     high, solution.corner_sigma));
   }
   if (evidence.stamp_difference > kMostStampDifference) {
-    reasons.pushRolling(
+    reasons.push_back(
         fmt::format("The stamps of the two cameras are {:.2f} ms apart. Trigger the cameras together",
                     evidence.stamp_difference * 1e3));
   }

@@ -87,9 +87,22 @@ std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
   const std::vector<double> sigmas = rmsSigmas(lens, covariance, pixels);
   std::vector<ImagePoint> points;
   for (std::size_t k = 0; k < pixels.size(); ++k) {
-    if (std::isfinite(sigmas[k])) points.push_back({pixels[k], sigmas[k]});
+    if (std::isfinite(sigmas[k])) {
+      points.push_back({pixels[k], sigmas[k]});
+    } else if (lens.kind() == CameraKind::kPinholeRadtan) {
+      points.push_back({pixels[k], std::numeric_limits<double>::infinity()});
+    }
   }
   return points;
+}
+
+double rayShare(const CameraModel& lens) {
+  const std::vector<Eigen::Vector2d> pixels = gridOf(lens);
+  const auto rays = std::count_if(pixels.begin(), pixels.end(), [&lens](const Eigen::Vector2d& pixel) {
+    Eigen::Vector3d ray;
+    return lens.unproject(pixel, ray);
+  });
+  return static_cast<double>(rays) / static_cast<double>(pixels.size());
 }
 
 std::vector<Eigen::Vector2d> projectionDifference(const CameraModel& lens, const CameraModel& other,
@@ -140,9 +153,13 @@ std::vector<ImagePoint> projectionDifference(const CameraModel& lens, const Came
 
 double rms(const std::vector<ImagePoint>& points) {
   double sum = 0;
-  for (const ImagePoint& point : points) sum += point.error * point.error;
-  return points.empty() ? std::numeric_limits<double>::infinity()
-                        : std::sqrt(sum / static_cast<double>(points.size()));
+  double count = 0;
+  for (const ImagePoint& point : points) {
+    if (!std::isfinite(point.error)) continue;
+    sum += point.error * point.error;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : std::numeric_limits<double>::infinity();
 }
 
 double quantile(const std::vector<ImagePoint>& points, double part) {

@@ -38,9 +38,14 @@ struct ImagePoint {
                                             const Eigen::Matrix<double, 8, 8>& covariance,
                                             const std::vector<Eigen::Vector2d>& pixels);
 
-/// 1 sigma over the grid; points where the lens has no inverse are omitted.
+/// 1 sigma over the grid. At points where the lens has no inverse, it is infinite for a radial-tangential
+/// lens: its distortion folds inside the image, and nothing is known there. Such points of a fisheye are
+/// omitted: they are usually the dark corners of its image.
 [[nodiscard]] std::vector<ImagePoint> projectionSigmas(const CameraModel& lens,
                                                        const Eigen::Matrix<double, 8, 8>& covariance);
+
+/// Share of the grid's pixels that have a ray.
+[[nodiscard]] double rayShare(const CameraModel& lens);
 
 /// Where `other` projects what `lens` sees at the pixels, minus these pixels [px], after the rotation that
 /// makes them agree best (Cauchy weights, 1 px) at the pixels marked `fit`. NaN where either has no ray.
@@ -52,7 +57,7 @@ struct ImagePoint {
 /// The same over the whole grid, fitted to all of it; points where either has no ray are omitted.
 [[nodiscard]] std::vector<ImagePoint> projectionDifference(const CameraModel& lens, const CameraModel& other);
 
-/// Rms over the points.
+/// Rms over the points with a finite error.
 [[nodiscard]] double rms(const std::vector<ImagePoint>& points);
 /// The value that `part` of the points do not exceed.
 [[nodiscard]] double quantile(const std::vector<ImagePoint>& points, double part);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "estimator/geometry/so3.hpp"
@@ -30,11 +31,20 @@ constexpr double kStereoLength = 1e-3;              // of the baseline; see kBas
 constexpr double kByChance = 3.5;                   // sigmas of a cell's mean, the largest of 200 cells
 
 double percentile(std::vector<double> values, double part) {
-  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  std::erase_if(values, [](double value) { return std::isnan(value); });
   if (values.empty()) return std::nan("");
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, at);
   return *at;
+}
+
+/// Sets the sigmas of pixels without a ray to infinity, as projection_error.hpp does, but not a fisheye's.
+std::vector<double> counted(const CameraModel& model, std::vector<double> sigmas) {
+  if (model.kind() != CameraKind::kPinholeRadtan) return sigmas;
+  for (double& sigma : sigmas) {
+    if (std::isnan(sigma)) sigma = std::numeric_limits<double>::infinity();
+  }
+  return sigmas;
 }
 
 /// Largest mean residual of a cell, minus the effect of chance.
@@ -79,11 +89,15 @@ void addLens(const CameraSolution& solution, const BoardEvidence& evidence, std:
   const std::vector<double> sigmas = worstSigmas(model, camera.covariance, pixels);
   ImageDrawing uncertainty(model.width(), model.height());
   uncertainty.heat(grid, sigmas, 2 * good, "px, 1 sigma");
-  uncertainty.caption(fmt::format("worst {:.3f} px, 95 % below {:.3f} px; best rotation taken out",
-                                  percentile(sigmas, 1), percentile(sigmas, 0.95)));
+  const std::vector<double> all = counted(model, sigmas);
+  const double rays = rayShare(model);
+  uncertainty.caption(
+      fmt::format("worst {:.3f} px, 95 % below {:.3f} px; best rotation taken out{}", percentile(all, 1),
+                  percentile(all, 0.95),
+                  rays < 1 ? fmt::format("; {:.0f} % of the image has no ray", 100 * (1 - rays)) : ""));
   page.plots.push_back(heatPlot(fmt::format("uncertainty{}", c), "Uncertainty and cross-validation",
                                 who + ": uncertainty of a projected pixel", uncertainty));
-  rules.atMost(who + ": uncertainty of a pixel, 95 % of the image", "px", percentile(sigmas, 0.95), good,
+  rules.atMost(who + ": uncertainty of a pixel, 95 % of the image", "px", percentile(all, 0.95), good,
                fmt::format("The lens of camera {} is not determined well enough in parts of the image. "
                            "Record more views there, close and tilted.",
                            c));
