@@ -13,12 +13,12 @@
 
 namespace swiftlet {
 
-void BoardLogOptions::addTo(CLI::App& command, const std::string& log_help) {
+CLI::Option* BoardLogOptions::addTo(CLI::App& command, const std::string& log_help) {
   command.add_option("LOG", log.log, log_help)->required();
   command
       .add_option("--target", target, "Board description: YAML from `swiftlet calibrate target` or Kalibr")
       ->required();
-  command.add_flag("--mono", log.mono, "Use camera 0 only");
+  return command.add_flag("--mono", log.mono, "Use camera 0 only");
 }
 
 void BoardLogOptions::checkOut(const std::vector<std::string>& other_inputs) const {

@@ -20,8 +20,8 @@ struct BoardLogOptions {
   std::string target;
   std::string out;
 
-  /// Adds LOG, --target and --mono.
-  void addTo(CLI::App& command, const std::string& log_help);
+  /// Adds LOG, --target and --mono. The option --mono.
+  CLI::Option* addTo(CLI::App& command, const std::string& log_help);
   /// Called before the search, which takes minutes. InputError if the result would overwrite the log, the
   /// board or one of the other files read, or files in `out` that no calibration wrote.
   void checkOut(const std::vector<std::string>& other_inputs) const;

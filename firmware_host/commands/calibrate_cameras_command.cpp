@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/board_log.hpp"
 #include "firmware_host/commands/calibrate_commands.hpp"
 #include "firmware_host/commands/checks.hpp"
@@ -25,6 +26,9 @@ int calibrateLogCameras(CamerasOptions options) {
   options.checkOut({});
   const std::optional<LogViews> log = searchBoard(options);
   if (!log) return kExitFailed;
+  if (log->camera_count < 2 && options.baseline_mm > 0) {
+    throw InputError("--baseline", 0, "", "is given, but the log has one camera", "Omit it");
+  }
   const CameraSolution solution = fitCameras(options, *log, options.baseline_mm * 1e-3);
   fmt::print("{}", describe(solution));
   const CalibrationPage content = cameraPage(solution, options.log.target, options.log.log);
@@ -51,7 +55,8 @@ void addCalibrateCameras(CLI::App& calibrate, int& exit_code) {
   CLI::App* command = calibrate.add_subcommand(
       "cameras", "Calibrate the lenses of one or two cameras and their relative pose from images of a board");
   auto options = std::make_shared<CamerasOptions>();
-  options->addTo(*command,
+  CLI::Option* mono =
+      options->addTo(*command,
                      "Images of the board: a EuRoC folder (cam0 and cam1, IMU not needed; image names may be "
                      "numbers), an archive of one, a bag, or a recording. No calibration is needed");
   command->add_option("--out", options->out,
@@ -60,7 +65,8 @@ void addCalibrateCameras(CLI::App& calibrate, int& exit_code) {
       ->add_option(
           "--baseline", options->baseline_mm,
           "Distance between the two lenses [mm], measured by hand: reveals a board of the wrong size")
-      ->check(nonNegative());
+      ->check(nonNegative())
+      ->excludes(mono);
   command->footer(
       "Example:\n"
       "  swiftlet calibrate cameras board_log --target board.yaml --out rig\n"

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -89,6 +90,8 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
   const CameraSolution cameras = fitCameras(options, log, 0);
   input.cameras = chain ? camerasOf(*chain, log, options.cameras) : cameras;
   if (chain && chain->has_imu) input.told = chain->rig;
+  std::array<double, kMaxCameras> rates{};
+  for (std::size_t c = 0; c < log.camera_count; ++c) rates[c] = imageRate(log.views, c);
   input.views = std::move(log.views);
   const bool lenses = hasLenses(input.cameras);
   ImuCameraSolution solution;
@@ -112,7 +115,8 @@ int calibrateLogImuCamera(ImuCameraOptions options) {
                                       : cameraPage(cameras, input.target, options.log.log);
   writeCalibrationPage((std::filesystem::path(options.out) / "report.html").string(), page);
   if (!solution.reasons.empty()) return refuseCalibration(solution.reasons);
-  writeCalibration(options.out, calibrationOf(solution, input.noise));
+  writeCalibration(options.out, calibrationOf(solution, input.noise, rates),
+                   "found by swiftlet calibrate imu-camera");
   fmt::print("{}\nwritten to {}\n", page.verdict_text, options.out);
   return kExitDone;
 }

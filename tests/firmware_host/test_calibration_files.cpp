@@ -7,6 +7,7 @@
 #include "drivers/simulated/rig_presets.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/outputs/run_folder/calibration_files.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet;
 
@@ -70,7 +71,9 @@ TEST_CASE("calibration files: both forms read back as what was written", "[calib
     given.accel_matrix << 0.995, 0, 0, 0.002, 1.004, 0, -0.003, 0.001, 1.01;
     given.gyro_by_force(1, 2) = 2e-4;
   }
-  writeCalibration(folder.string(), given);
+  writeCalibration(folder.string(), given, "found here");
+  CHECK(test::contains(test::textOf(folder / "cam1/sensor.yaml"), "comment: \"found here\""));
+  CHECK(test::contains(test::textOf(folder / "imu0/sensor.yaml"), "comment: found here"));
   const Calibration euroc = readCalibration(folder.string());
   const Calibration kalibr = readCalibration((folder / "camchain-imucam.yaml").string());
   CHECK(euroc.R_body_imu.isApprox(given.R_body_imu, 1e-12));

@@ -37,9 +37,9 @@ void writeSensor(const std::filesystem::path& folder, const std::string& text) {
   writeWholeFile((folder / "sensor.yaml").string(), text);
 }
 
-void writeImu(const std::filesystem::path& root, const Calibration& given) {
+void writeImu(const std::filesystem::path& root, const Calibration& given, const std::string& origin) {
   const SE3 T_filebody_imu(Eigen::Quaterniond(given.R_body_imu), given.T_body_filebody.inverse().translation);
-  writeSensor(root / "imu0", imuYaml(given.noise, "as given", T_filebody_imu, imuMatricesYaml(given)));
+  writeSensor(root / "imu0", imuYaml(given.noise, origin, T_filebody_imu, imuMatricesYaml(given)));
 }
 
 std::string shiftYaml(Duration shift) { return fmt::format("timeshift_cam_imu: {:.9f}\n", shift.seconds()); }
@@ -97,23 +97,23 @@ void writeEstimatedCalibration(const std::string& folder, const Calibration& giv
     writeSensor(root / fmt::format("cam{}", c), cameraYaml(given.rig.camera[c], T_filebody_body * T_body_cam,
                                                            rate, originText(estimate, c), times));
   }
-  writeImu(root, given);
+  writeImu(root, given, "as given");
 }
 
-void writeCalibration(const std::string& folder, const Calibration& calibration) {
+void writeCalibration(const std::string& folder, const Calibration& calibration, const std::string& origin) {
   const std::filesystem::path root(folder);
   const Rig& rig = calibration.rig;
   const std::string times = shiftYaml(rig.camera_to_imu_shift) + shutterYaml(rig.readout);
   std::string chain;
   for (std::size_t c = 0; c < rig.camera_count; ++c) {
-    const std::string origin =
-        calibration.conversion[c].empty() ? "as given" : "converted; " + calibration.conversion[c];
+    const std::string text =
+        calibration.conversion[c].empty() ? origin : "converted; " + calibration.conversion[c];
     writeSensor(root / fmt::format("cam{}", c),
                 cameraYaml(rig.camera[c], calibration.T_body_filebody.inverse() * rig.T_body_cam[c],
-                           calibration.camera_rate_hz[c], fmt::format("\"{}\"", origin), times));
+                           calibration.camera_rate_hz[c], fmt::format("\"{}\"", text), times));
     chain += kalibrCamera(calibration, c);
   }
-  writeImu(root, calibration);
+  writeImu(root, calibration, origin);
   writeWholeFile((root / "camchain-imucam.yaml").string(), chain);
   writeWholeFile((root / "imu.yaml").string(), kalibrImu(calibration));
 }

@@ -15,7 +15,9 @@ void writeEstimatedCalibration(const std::string& folder, const Calibration& giv
                                const CalibrationEstimate& estimate, double rate_hz);
 
 /// Writes `calibration`, of any source format, as EuRoC's files and as Kalibr's camchain-imucam.yaml and
-/// imu.yaml for other tools. Creates `folder`; InputError if a file cannot be written.
-void writeCalibration(const std::string& folder, const Calibration& calibration);
+/// imu.yaml for other tools. `origin` says in the sensors' files where the values are from. Creates `folder`;
+/// InputError if a file cannot be written.
+void writeCalibration(const std::string& folder, const Calibration& calibration,
+                      const std::string& origin = "as given");
 
 }  // namespace swiftlet

@@ -138,3 +138,14 @@ TEST_CASE("a board description that was corrected stays") {
   CHECK(contains(said.text, "corrected by hand"));
   CHECK(textOf(folder.file("board.yaml")) == corrected);
 }
+
+TEST_CASE("a baseline without a second camera is refused") {
+  const ScratchFolder folder("calibrate_baseline");
+  const std::string log = emptyLog(folder, 3);
+  const std::string target = board(folder);
+  CHECK(run({"calibrate", "cameras", log, "--target", target, "--mono", "--baseline", "110"}) ==
+        kExitBadInput);
+  const Said said = say({"calibrate", "cameras", log, "--target", target, "--baseline", "110"});
+  CHECK(said.code == kExitBadInput);
+  CHECK(contains(said.text, "one camera"));
+}

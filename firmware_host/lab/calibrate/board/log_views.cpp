@@ -46,6 +46,20 @@ void search(const std::vector<WaitingImage>& batch, std::size_t count,
 
 }  // namespace
 
+double imageRate(const std::vector<BoardView>& views, std::size_t camera) {
+  std::vector<double> intervals;
+  const BoardView* last = nullptr;
+  for (const BoardView& view : views) {
+    if (view.camera != camera) continue;
+    if (last != nullptr) intervals.push_back((view.stamp - last->stamp).seconds());
+    last = &view;
+  }
+  if (intervals.empty()) return 0;
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return *middle > 0 ? 1 / *middle : 0;
+}
+
 LogViews readLogViews(const LogViewsRequest& request) {
   constexpr std::size_t kBatch = 16;
   constexpr unsigned kMostThreads = 8;

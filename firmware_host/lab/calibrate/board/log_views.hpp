@@ -38,6 +38,9 @@ struct LogViews {
   std::vector<std::string> warnings;                  ///< about the log, for the user
 };
 
+/// Hz, from the median interval of the camera's images; 0: fewer than two.
+[[nodiscard]] double imageRate(const std::vector<BoardView>& views, std::size_t camera);
+
 /// InputError if the log cannot be read.
 [[nodiscard]] LogViews readLogViews(const LogViewsRequest& request);
 

@@ -21,11 +21,13 @@ std::string describe(const ImuCameraSolution& solution) {
   return text;
 }
 
-Calibration calibrationOf(const ImuCameraSolution& solution, const ImuNoise& noise) {
+Calibration calibrationOf(const ImuCameraSolution& solution, const ImuNoise& noise,
+                          const std::array<double, kMaxCameras>& camera_rate_hz) {
   Calibration calibration;
   calibration.form = "swiftlet";
   calibration.rig = solution.rig;
   calibration.noise = noise;
+  calibration.camera_rate_hz = camera_rate_hz;
   calibration.gyro_matrix = solution.gyro_matrix;
   calibration.accel_matrix = solution.accel_matrix;
   return calibration;

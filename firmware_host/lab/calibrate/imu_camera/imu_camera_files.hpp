@@ -1,6 +1,7 @@
 #pragma once
 // A calibrated rig with an IMU as text for people, and as files for flights and other programs.
 
+#include <array>
 #include <string>
 
 #include "drivers/calibration/calibration.hpp"
@@ -12,7 +13,8 @@ namespace swiftlet {
 [[nodiscard]] std::string describe(const ImuCameraSolution& solution);
 
 /// The calibration as used by flights: lenses, extrinsics, time offset, readout, the IMU's matrices. `noise`:
-/// the given densities.
-[[nodiscard]] Calibration calibrationOf(const ImuCameraSolution& solution, const ImuNoise& noise);
+/// the given densities. `camera_rate_hz`: of the images; 0: unknown.
+[[nodiscard]] Calibration calibrationOf(const ImuCameraSolution& solution, const ImuNoise& noise,
+                                        const std::array<double, kMaxCameras>& camera_rate_hz = {});
 
 }  // namespace swiftlet
