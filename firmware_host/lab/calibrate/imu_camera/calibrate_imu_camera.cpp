@@ -80,7 +80,8 @@ double costIn(const BatchProblem& problem, const BatchNoise& noise) {
          problem.cost(Residuals::kAccel) * square(own.accel / noise.accel);
 }
 
-/// Refines the knots while this explains more than noise.
+/// Halves the spacing of the knots until a halving explains no more than noise. The last one is kept: it only
+/// costs time.
 void chooseKnots(BatchProblem& problem, double rate_hz) {
   while (problem.state().spline.spacing() / 2 >= kReadingsPerKnot / rate_hz) {
     const BatchProblem coarse = problem;
