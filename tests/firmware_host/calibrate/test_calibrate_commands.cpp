@@ -1,11 +1,14 @@
 // `swiftlet calibrate` as a shell calls it: what it must not write, and what it must not leave.
 #include <signal.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/image_files.hpp"
@@ -52,7 +55,10 @@ TEST_CASE("a search that the user stops gives no calibration, and later signals 
   const ScratchFolder folder("calibrate_stopped");
   const std::string log = emptyLog(folder, 200);
   std::thread user([] {
-    while (endsProgram(SIGINT)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    constexpr int kMostWaits = 20000;
+    for (int i = 0; i < kMostWaits && endsProgram(SIGINT); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
     kill(getpid(), SIGINT);
   });
   const Said said =
