@@ -9,10 +9,10 @@
 
 namespace swiftlet {
 
-/// Lines `true,predicted,probability` (`#` starts a comment), labels from 1 to 31. The probabilities of one true
-/// label sum to 1; pairs that are not listed have probability 0. A true label without any line is recognized
-/// with probability `right`, and the other labels share the rest equally. InputError with line, field and
-/// remedy.
+/// Lines `true,predicted,probability` (`#` starts a comment), labels from 1 to 31. The probabilities of one
+/// true label sum to 1; pairs that are not listed have probability 0. A true label without any line is
+/// recognized with probability `right`, and the other labels share the rest equally. InputError with line,
+/// field and remedy.
 ConfusionModel readConfusion(const std::string& path, float right);
 
 /// Reads the file named by map.confusion; empty if none is named.
