@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 #include <chrono>
+#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -54,6 +55,8 @@ bool endsProgram(int signal) {
 TEST_CASE("a search that the user stops gives no calibration, and later signals end the program") {
   const ScratchFolder folder("calibrate_stopped");
   const std::string log = emptyLog(folder, 200);
+  std::signal(SIGINT, SIG_DFL);  // Catch has handlers of its own
+  std::signal(SIGTERM, SIG_DFL);
   std::thread user([] {
     constexpr int kMostWaits = 20000;
     for (int i = 0; i < kMostWaits && endsProgram(SIGINT); ++i) {
