@@ -20,7 +20,7 @@ struct BoardLogOptions {
   std::string target;
   std::string out;
 
-  /// Adds LOG, --target and --mono. The option --mono.
+  /// Adds LOG, --target and --mono. Returns the option --mono.
   CLI::Option* addTo(CLI::App& command, const std::string& log_help);
   /// Called before the search, which takes minutes. InputError if the result would overwrite the log, the
   /// board or one of the other files read, or files in `out` that no calibration wrote.
@@ -35,7 +35,7 @@ struct BoardLogOptions {
 [[nodiscard]] CameraSolution fitCameras(const BoardLogOptions& options, const LogViews& log,
                                         double told_baseline);
 
-/// What `work` returns. It takes a function that shows the share that is done, 0 to 1, as a bar.
+/// Runs `work` with a progress bar and returns its result. `work` takes a function of the share done, 0 to 1.
 template <typename Work>
 auto withProgress(const std::string& what, const Work& work) {
   constexpr int kParts = 100;
@@ -46,7 +46,7 @@ auto withProgress(const std::string& what, const Work& work) {
   return result;
 }
 
-/// Prints why there is no calibration. The exit code.
+/// Prints why there is no calibration. Returns the exit code.
 int refuseCalibration(const std::vector<std::string>& reasons);
 
 }  // namespace swiftlet

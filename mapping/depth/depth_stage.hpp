@@ -2,12 +2,11 @@
 // Raw stereo pair to depth image: rectification, semi-global matching, depth with its standard deviation.
 //
 // Depth z = f b / d and sigma_z = z^2 / (f b) sigma_d, in metres along the axis of the rectified camera 0;
-// sigma_d is from the matcher. Pixels nearer than `min_depth` have no depth. There is
-// no upper limit, because a far surface proves that the space before it is free.
-// Errors: kInvalidInput (an image missing or of another size, a rig that cannot be rectified, an output of
-// another size); the output is then unchanged and the step counted. Memory: fixed by the constructor, 38
-// bytes a pixel and the matcher's strips. Time grows with pixels x disparities. One thread, no clock,
-// deterministic. docs/depth.md.
+// sigma_d is from the matcher. Pixels nearer than `min_depth` have no depth. There is no upper limit, because
+// a far surface proves that the space in front of it is free. Errors: kInvalidInput (an image missing or of
+// another size, a rig that cannot be rectified, an output of another size); the output is then unchanged and
+// the step counted. Memory: fixed by the constructor, 38 bytes a pixel and the matcher's strips. Time grows
+// with pixels x disparities. One thread, no clock, deterministic. docs/depth.md.
 
 #include <cstdint>
 #include <vector>
@@ -25,8 +24,8 @@ namespace swiftlet {
 struct DepthSettings {
   MatcherSettings matcher;
   double min_depth = 0.2;  ///< m
-  /// Depth [m] from which the pair should measure: more disparities than the matcher's are searched for it,
-  /// as many as there can be. What a vehicle has to avoid at a metre must not be missing.
+  /// Nearest depth [m] that the pair should measure: if the matcher's disparities do not reach it, more are
+  /// searched, up to the maximum. A vehicle must see obstacles at a distance of a metre.
   double wanted_nearest = 1.0;
 };
 
@@ -63,7 +62,7 @@ class DepthStage {
   /// Adds labels in camera 0's raw geometry to the output of a step.
   Status addLabels(const ImageView& labels, DepthBuffer& out);
 
-  /// Depth [m] of the largest disparity. What is nearer gets no depth or a wrong one.
+  /// Depth [m] of the largest disparity. Nearer surfaces get no depth or a wrong one.
   [[nodiscard]] double nearestDepth() const;
   [[nodiscard]] const DisparityImage& disparity() const { return disparity_; }
   [[nodiscard]] const DepthCounters& counters() const { return counters_; }

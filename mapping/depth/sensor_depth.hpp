@@ -2,11 +2,11 @@
 // Image of a depth sensor to a depth image with standard deviations: 16-bit counts (a log's `depth0`) or
 // float metres.
 //
-// Depth is along the axis of an ideal pinhole camera. Counts 0 and 65535 (what some sensors write
-// for no depth), NaN, infinite, not positive and too near are no depth; each kind is counted. sigma = floor +
-// square (z - knee)^2 for z > knee, floor below; the defaults are Kinect's (Nguyen, Izadi, Lovell, 3DIMPVT
-// 2012, eq. 2). mapping/map/view_warp.hpp adds grey values and labels of a camera. Errors: kInvalidInput
-// (missing, or of another size), counted; the output is then unchanged. Deterministic.
+// Depth is along the axis of an ideal pinhole camera. Counts 0 and 65535 (some sensors write it for no
+// depth), and values that are NaN, infinite, not positive or too near, are no depth; each kind is counted.
+// sigma = floor + square (z - knee)^2 for z > knee, floor below; the defaults are Kinect's (Nguyen, Izadi,
+// Lovell, 3DIMPVT 2012, eq. 2). mapping/map/view_warp.hpp adds grey values and labels of a camera. Errors:
+// kInvalidInput (missing, or of another size), counted; the output is then unchanged. Deterministic.
 
 #include <cstdint>
 

@@ -98,12 +98,12 @@ void LoopMap::releaseTies(std::uint32_t piece) {
   for (std::uint32_t id = 0; id < loops(); ++id) {
     const std::uint32_t a = component(loopEdge(id).from);
     const std::uint32_t b = component(loopEdge(id).to);
-    // The whole set: what is left of it would be too few to be accepted, and still be the largest.
+    // The whole set: the rest would be too few to be accepted, but still the largest set.
     const LoopVerdict verdict = graph_.selection().verdict(id);
     const bool in_set = verdict == LoopVerdict::kSelected || verdict == LoopVerdict::kUnsupported;
     if (in_set && a != b && (a == piece || b == piece)) static_cast<void>(graph_.release(id));
   }
-  pieces_.follow(graph_);  // apart, so that the next ties align the piece anew
+  pieces_.follow(graph_);  // separates the piece, so that the next loops align it again
   graph_.search();
 }
 

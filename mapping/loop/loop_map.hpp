@@ -44,7 +44,7 @@ inline constexpr double kNodeDistance = 0.25;  // m
 inline constexpr double kNodeTurn = 0.2;       // rad
 inline constexpr double kNodeSeconds = 2;
 
-/// Whether two poses of the body are farther apart than motion makes nodes.
+/// Whether two poses of the body are farther apart than the spacing of nodes.
 [[nodiscard]] bool viewsDiffer(const SE3& a, const SE3& b);
 
 /// Frame indices and epochs of kept nodes start here; those of a flight stay below.
@@ -107,8 +107,8 @@ class LoopMap {
   /// LoopSelection.
   Status addLoop(std::uint32_t from, std::uint32_t to, const SE3& T_from_to,
                  const PoseMatrix<SE3>& covariance, std::uint32_t& id);
-  /// Releases the loops of the largest sets between this piece and others. Loops that contradicted them are
-  /// searched anew.
+  /// Releases the loops of the largest sets between this piece and others. Searches again among the
+  /// loops that contradicted them.
   void releaseTies(std::uint32_t piece);
   /// RobustGraph::settle(), up to `iterations`. `moved`: poses may have changed.
   Status settle(int iterations, bool& moved);

@@ -24,12 +24,11 @@ constexpr double kNearDistance = 2;                 // m
 constexpr double kNearTurn = std::numbers::pi / 4;  // rad
 constexpr std::size_t kNearSearches = 8;            // in a step, each linear in nodes
 
-// A location predicts that views near kept ones are recognized. Up to this share of what near is, 93 % are
-// where the location is right (docs/experiments/accuracy_loops.md). If misses were independent, ten in a row
-// would happen there once in 1e11 tries, and once in 1e4 if only 60 % are recognized, as when the light has
-// changed.
-constexpr double kSureView = 0.75;
-constexpr int kMostMissed = 10;  // views
+// A location predicts that views near kept ones are recognized. At a correct location, 93 % of the views up
+// to kSureView are (docs/experiments/accuracy_loops.md). If misses are independent, ten in a row happen there
+// once in 1e11 tries, or once in 1e4 if only 60 % are recognized, for example in changed light.
+constexpr double kSureView = 0.75;  // as given by view(): up to 1 views are near
+constexpr int kMostMissed = 10;     // views
 
 PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
   PlaceDatabaseSettings out;
@@ -269,13 +268,14 @@ bool LoopStage::compareNearest(std::uint32_t to, const LoopEffort& effort, LoopR
   return tied;
 }
 
-/// `view`: how far `to` is from the kept node that it was compared with; `seen`: as the location predicted.
+/// Counts predicted views that are not recognized, and withdraws the location after kMostMissed in a row.
+/// `view`: distance of `to` from the kept node that it was compared with; `seen`: it was recognized there.
 void LoopStage::checkLocation(std::uint32_t to, double view, bool seen) {
   if (seen) {
     missed_ = 0;
     return;
   }
-  // Whatever hides one view from a hovering vehicle is one miss.
+  // A view that is hidden from a hovering vehicle counts as one miss.
   const SE3& here = map_.node(to).T_world_body;
   if (view > kSureView || (missed_ > 0 && !viewsDiffer(missed_at_, here))) return;
   missed_at_ = here;
@@ -284,7 +284,7 @@ void LoopStage::checkLocation(std::uint32_t to, double view, bool seen) {
   map_.releaseTies(map_.component(to));
 }
 
-/// Whether the loop is one of the set of those that agree.
+/// Whether the loop belongs to the set of loops that agree.
 bool LoopStage::agrees(std::uint32_t id) const {
   const LoopVerdict verdict = map_.graph().verdict(id);
   return verdict == LoopVerdict::kSelected || verdict == LoopVerdict::kUnsupported;

@@ -99,7 +99,7 @@ void BlockUpdate::projectEight(const Eigen::Vector3f& first, std::size_t at, Vox
   const Ints hit = reached & (s > -behind);
   Ints seen = hit | ((measured < 0.0F) & (s >= truncation));
   if (const Ints free = seen & (s >= truncation); lanes::any(free)) {
-    // One pixel speaks for all of a voxel, which may hold a pole that the pixel beside it measures.
+    // The centre falls on one pixel, but the voxel may hold a pole that a neighbouring pixel measures.
     const Ints tile = (row / PreparedImage::kTile) * image_->tileColumns() + column / PreparedImage::kTile;
     Floats nearest;
     lanes::gather(nearest, image_->nearest(), tile);

@@ -85,7 +85,7 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
     const float ratio = reference / sigma;
     return std::min(std::max(kWeightSteps * ratio * ratio, 1.0F), kMostPixelWeight);
   };
-  // Free up to the range, and not up to what the measurement may be wrong.
+  // Free up to the range, at most to where the surface may be within the error of the measurement.
   const auto freeBefore = [least, most](float d, float sigma) {
     const float free = std::min(d - kSureSigmas * sigma, most);
     return free > least ? -free : 0.0F;
@@ -171,7 +171,8 @@ void PreparedImage::findSlopes() {
   std::copy_n(&slope_[(height - 2) * width], width, &slope_[(height - 1) * width]);
 }
 
-/// Of an unmeasured pixel: another one touches it. A single one is noise; more may be a pole without depth.
+/// Whether another unmeasured pixel touches this one. A single one is noise; more may be a pole without
+/// depth.
 bool PreparedImage::isHole(int u, int v) const {
   int unmeasured = 0;
   for (int y = std::max(v - 1, 0); y <= std::min(v + 1, camera_.height - 1); ++y) {

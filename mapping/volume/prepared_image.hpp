@@ -55,7 +55,7 @@ class PreparedImage {
   [[nodiscard]] const std::uint8_t* labels() const { return has_labels_ ? label_.data() : nullptr; }
 
   /// A depth [m] up to which all of the rectangle (inclusive, within the image) is free; 0 if one of its
-  /// tiles has a hole, two unmeasured pixels beside each other: a thing that gives no depth may stand there.
+  /// tiles has a hole, two unmeasured pixels that touch: an object without measured depth may stand there.
   /// A lower bound: coarse levels of the pyramid make it smaller, never larger.
   [[nodiscard]] float freeDepth(int left, int top, int right, int bottom) const;
   /// The deepest measured pixel of the tile (column, row at level 0), or 0.
