@@ -48,7 +48,7 @@ void checkClocks(const ArmingFacts& facts, const ArmingSettings& settings, Armin
   for (std::size_t i = 0; i < kMaxCameras; ++i) {
     if (!facts.off_trigger[i]) continue;
     lack(verdict, ArmingCondition::kClocks,
-         "check the trigger line, trigger.delay_us and cameras.exposure_ms; `swiftlet doctor` shows the match",
+         "check the trigger line, trigger.delay_us and cameras.exposure_ms; see `swiftlet doctor`",
          "the images of camera %zu do not match the trigger edges", i);
   }
   if (!facts.has_sample || !facts.has_image) {
