@@ -35,8 +35,9 @@ std::optional<Obstacle> nearestInBox(const LocalMesh& mesh, const SE3& T_world_b
 
 /// Sectors around the vehicle, clockwise seen from above; sector 0 is centred on its heading.
 inline constexpr std::size_t kObstacleSectors = 72;
-/// Horizontal distance [m] to the nearest point of the mesh in each sector. kNothingKnown if the mesh has
-/// none there; the sector may still contain obstacles.
+/// Horizontal distance [m] to the nearest point of the mesh in each sector. Above SectorQuery::reach: faces
+/// cross the whole width of the sector, all beyond the reach, so it is free as far as the mesh tells.
+/// kNothingKnown: the sector may contain obstacles.
 using SectorDistances = std::array<float, kObstacleSectors>;
 inline constexpr float kNothingKnown = std::numeric_limits<float>::infinity();
 
@@ -45,7 +46,7 @@ struct SectorQuery {
   float heading = 0;   ///< [rad] of its forward axis from the world's x to its y
   float below = 0.5F;  ///< [m] points lower than this below the vehicle are ignored
   float above = 0.5F;  ///< [m] points higher than this above the vehicle are ignored
-  float reach = 20;    ///< [m]
+  float reach = 20;    ///< [m] up to this distance, a face in any part of a sector counts
 };
 
 /// Cost: about 0.1 us per face in the band and sector crossed.

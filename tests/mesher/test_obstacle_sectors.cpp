@@ -67,6 +67,36 @@ TEST_CASE("What is above, below or too far does not count; what surrounds the ve
   for (const float distance : nearestBySector(*mesh, {})) CHECK(distance == 0);
 }
 
+TEST_CASE("A sector is free where far faces cross its whole width, unknown where they cross a part",
+          "[obstacles]") {
+  const auto mesh = std::make_unique<LocalMesh>();
+  SectorQuery query;
+  query.reach = 20;
+  // 30 m ahead, from 10 degrees left to 10 right, in two faces with a common edge: the sectors of
+  // 0 and 5 degrees are crossed whole, those of 10 degrees by half.
+  const float side = 30 * std::tan(10 * kDegree);
+  addFace(*mesh, {30, -side, -9}, {30, side, -9}, {30, side, 9});
+  addFace(*mesh, {30, -side, -9}, {30, side, 9}, {30, -side, 9});
+  const SectorDistances far = nearestBySector(*mesh, query);
+  for (const std::size_t free : {0U, 1U, 71U}) {
+    CHECK(far[free] > query.reach);
+    CHECK(far[free] < 31);
+  }
+  for (const std::size_t unknown : {2U, 70U, 3U, 69U}) CHECK(far[unknown] == kNothingKnown);
+  // A gap of two degrees in the middle.
+  const auto gap = std::make_unique<LocalMesh>();
+  const float inner = 30 * std::tan(1 * kDegree);
+  addFace(*gap, {30, -side, -9}, {30, -inner, -9}, {30, -inner, 9});
+  addFace(*gap, {30, -side, -9}, {30, -inner, 9}, {30, -side, 9});
+  addFace(*gap, {30, inner, -9}, {30, side, -9}, {30, side, 9});
+  addFace(*gap, {30, inner, -9}, {30, side, 9}, {30, inner, 9});
+  CHECK(nearestBySector(*gap, query)[0] == kNothingKnown);
+  CHECK(nearestBySector(*gap, query)[1] > query.reach);
+  // Near faces count in whatever part of the sector they are.
+  query.reach = 40;
+  CHECK(nearestBySector(*gap, query)[2] == Approx(30 / std::cos(7.5F * kDegree)).epsilon(1e-4));
+}
+
 TEST_CASE("Random faces are met as a dense sampling meets them", "[obstacles]") {
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     Random random(seed);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "mesher/obstacle_queries.hpp"
 
@@ -36,7 +35,7 @@ std::optional<mavlink::ObstacleDistance> obstacleDistanceOf(const LocalMesh& mes
   SectorQuery query;
   query.origin = (T.translation + T.R() * mounting.p_body_vehicle).cast<float>();
   query.heading = static_cast<float>(std::atan2(forward.y(), forward.x()));
-  query.reach = std::numeric_limits<float>::max();  // to tell far surfaces, reported as free, from unknown
+  query.reach = kObstacleReach;
   const SectorDistances nearest = nearestBySector(mesh, query);
 
   mavlink::ObstacleDistance message;

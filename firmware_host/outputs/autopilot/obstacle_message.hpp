@@ -3,9 +3,9 @@
 //
 // 72 sectors of 5 degrees, clockwise from the vehicle's heading (MAV_FRAME_BODY_FRD: rotated with the
 // vehicle's yaw, level). Distances are from the vehicle's reference point to the nearest mesh within half a
-// metre above and below it. A sector without any mesh is unknown, not free; a sector whose nearest mesh is
-// beyond kObstacleReach is reported as free up to that distance. Pure; costs what nearestBySector costs, some
-// 0.1 ms. Source: MAVLink common.xml, OBSTACLE_DISTANCE; docs/mavlink.md.
+// metre above and below it. A sector is reported as free up to kObstacleReach if mesh beyond it crosses the
+// sector's whole width; without mesh, or with part of the width, it is unknown. Pure; costs what
+// nearestBySector costs, some 0.1 ms. Source: MAVLink common.xml, OBSTACLE_DISTANCE; docs/mavlink.md.
 
 #include <optional>
 

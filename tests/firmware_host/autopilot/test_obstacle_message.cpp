@@ -98,17 +98,22 @@ TEST_CASE("Distances count from the vehicle's reference point, what touches it i
   CHECK(touching->min_cm > 0);
 }
 
-TEST_CASE("What is seen beyond the reach is free up to there, what is not seen is unknown", "[autopilot]") {
+TEST_CASE("A sector seen whole beyond the reach is free up to there, one seen in part is unknown",
+          "[autopilot]") {
   AutopilotMounting mounting;
   NavState state;
   state.stamp = kNow;
   state.health = Health::kDegraded;
+  // The wall is 2 m wide: at 250 m it crosses a tenth of the sector.
   for (const double distance : {19.99, 20.01, 250.0}) {
     const auto made = obstacleDistanceOf(*wallAt({distance, 0, 0}), state, mounting);
     REQUIRE(made);
     const mavlink::ObstacleDistance told = throughBytes(*made);
     CHECK(told.max_cm == 2000);
-    CHECK(told.distance_cm[0] == (distance < 20 ? 1999 : told.max_cm + 1));
+    const int expected = distance < 20    ? 1999
+                         : distance < 100 ? told.max_cm + 1
+                                          : int{mavlink::ObstacleDistance::kUnknown};
+    CHECK(told.distance_cm[0] == expected);
     for (std::size_t i = 5; i < told.distance_cm.size() - 5; ++i) {
       CHECK(told.distance_cm[i] == mavlink::ObstacleDistance::kUnknown);
     }
