@@ -33,9 +33,6 @@ constexpr double kLockUncertainty = 2e5;  // ns
 
 }  // namespace
 
-ClockMap::ClockMap(const ClockMapSettings& settings)
-    : settings_(settings), envelope_(settings.max_skew_ppm * kPpm) {}
-
 double ClockMap::tolerance(Stamp device) const { return kStepTolerance + 4 * envelope_.uncertainty(device); }
 
 Status ClockMap::add(Stamp device, Stamp arrival, Stamp& host) {
@@ -106,8 +103,8 @@ void ClockMap::watchForStepBack() {
 
 Status ClockMap::handOut(Stamp device, Stamp arrival, Stamp& host) {
   newest_ = device;
-  const Stamp latest = arrival - settings_.constant_delay;
-  const Stamp mapped = {device.ns + envelope_.at(device) - settings_.constant_delay.ns};
+  const Stamp latest = arrival - constant_delay_;
+  const Stamp mapped = {device.ns + envelope_.at(device) - constant_delay_.ns};
   delays_.add(arrival, latest - mapped);
   if (!rising_.next(std::min(mapped, latest), step_, host)) {
     ++refused_;
@@ -119,7 +116,7 @@ Status ClockMap::handOut(Stamp device, Stamp arrival, Stamp& host) {
 
 std::optional<Stamp> ClockMap::toHost(Stamp device) const {
   if (envelope_.empty() || !withinLimit(device)) return std::nullopt;
-  return Stamp{device.ns + envelope_.at(device) - settings_.constant_delay.ns};
+  return Stamp{device.ns + envelope_.at(device) - constant_delay_.ns};
 }
 
 LockState ClockMap::lock() const {
@@ -133,7 +130,7 @@ TimesyncStatus ClockMap::status() const {
   TimesyncStatus s;
   s.lock = lock();
   if (!envelope_.empty()) {
-    s.offset = {envelope_.at(newest_) - settings_.constant_delay.ns};
+    s.offset = {envelope_.at(newest_) - constant_delay_.ns};
     s.uncertainty = {static_cast<std::int64_t>(std::min(envelope_.uncertainty(newest_), kTooOld))};
   }
   s.skew_ppm = envelope_.slope() / kPpm;

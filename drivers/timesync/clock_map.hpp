@@ -32,14 +32,10 @@
 
 namespace swiftlet {
 
-struct ClockMapSettings {
-  Duration constant_delay;    ///< smallest delay from sensing to arrival; subtracted
-  double max_skew_ppm = 150;  ///< crystals are within 100; the rest is margin for the host's clock
-};
-
 class ClockMap {
  public:
-  explicit ClockMap(const ClockMapSettings& settings = {});
+  /// `constant_delay`: smallest delay from sensing to arrival; subtracted.
+  explicit ClockMap(Duration constant_delay = {}) : constant_delay_(constant_delay) {}
 
   /// Learns from one sample and maps it. `host` is written only if the status is ok.
   Status add(Stamp device, Stamp arrival, Stamp& host);
@@ -64,7 +60,7 @@ class ClockMap {
   void watchForStepBack();
   Status handOut(Stamp device, Stamp arrival, Stamp& host);
 
-  ClockMapSettings settings_;
+  Duration constant_delay_;
   LowerEnvelope envelope_;
   DelayHistogram delays_;
   RisingStamps rising_;

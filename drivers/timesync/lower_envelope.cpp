@@ -14,6 +14,16 @@ constexpr std::size_t kAloneFrom = 8;
 // Shortest span for a slope. A slope from a longer span is not replaced by one from a shorter span.
 constexpr std::int64_t kFirstSpan = 2'000'000'000;
 constexpr std::int64_t kLaterSpan = 8'000'000'000;
+// Crystals are within 100 ppm; the rest is margin for the host's clock. A bound keeps steps of the clock and
+// jitter out of the slope.
+constexpr double kCrystalSlope = 150e-6;
+// Steeper clocks exist: ceramic and RC oscillators are off by up to 2 %, and chrony slews the host's clock by
+// up to 8.3 %. They are recognized by points that lie near a steep line. A line through the points before and
+// after a step of the clock leaves at least half of the distances of a line that ignores the step.
+constexpr double kSteepest = 0.1;
+constexpr double kFarBetter = 3;
+// A steep slope, once known, is followed: temperature changes it by less than this factor within a window.
+constexpr double kSteepFactor = 1.5;
 // The lowest of n evenly distributed points lie a few times mean / n above the true line. The factor is the
 // 99 % point of the simulated clocks in tests/drivers/timesync.
 constexpr double kFitFactor = 4;
@@ -50,8 +60,8 @@ double LowerEnvelope::uncertainty(Stamp time) const {
   const double ahead =
       std::abs(static_cast<double>(time.ns - origin_.ns) - static_cast<double>(point(count_ - 1).time));
   const double half_span = static_cast<double>(span().ns) / 2;
-  const double of_slope = slope_known_ ? kWander : max_slope_;
-  return fit + of_slope * ahead + (slope_known_ ? 0 : max_slope_ * half_span);
+  const double of_slope = slope_known_ ? kWander : kCrystalSlope;
+  return fit + of_slope * ahead + (slope_known_ ? 0 : kCrystalSlope * half_span);
 }
 
 bool LowerEnvelope::raised(std::size_t fewest, double tolerance, double surprise, Stamp& since) const {
@@ -110,11 +120,13 @@ void LowerEnvelope::add(Stamp time, std::int64_t value_ns) {
 void LowerEnvelope::fit() {
   std::array<std::size_t, kBins> hull;
   std::size_t n = 0;
-  double mean_time = 0;
+  double mean_time = 0;   // since the oldest point
+  double mean_value = 0;  // above the oldest point
   const std::int64_t oldest = point(0).time;
   for (std::size_t i = 0; i < count_; ++i) {
     const Point& p = point(i);
     mean_time += static_cast<double>(p.time - oldest);
+    mean_value += rise(point(0), p);
     while (n >= 2) {
       const Point& a = point(hull[n - 2]);
       const Point& b = point(hull[n - 1]);
@@ -126,23 +138,39 @@ void LowerEnvelope::fit() {
     hull[n++] = i;
   }
   mean_time /= static_cast<double>(count_);
+  mean_value /= static_cast<double>(count_);
+  // The highest line of a slope below all points: its height at the oldest point, and the mean distance to
+  // it.
+  const auto levelOf = [&](double slope) {
+    double level = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < n; ++i) {
+      const Point& p = point(hull[i]);
+      level = std::min(level, rise(point(0), p) - slope * static_cast<double>(p.time - oldest));
+    }
+    return level;
+  };
+  const auto distanceOf = [&](double slope) { return mean_value - slope * mean_time - levelOf(slope); };
 
-  if (span().ns >= std::clamp(slope_span_, kFirstSpan, kLaterSpan)) {
+  if (span().ns >= kFirstSpan) {
     std::size_t edge = 0;
     while (edge + 2 < n && static_cast<double>(point(hull[edge + 1]).time - oldest) < mean_time) ++edge;
     const Point& a = point(hull[edge]);
     const Point& b = point(hull[edge + 1]);
-    slope_ = std::clamp(rise(a, b) / static_cast<double>(b.time - a.time), -max_slope_, max_slope_);
-    slope_known_ = true;
-    slope_span_ = span().ns;
+    const double best = rise(a, b) / static_cast<double>(b.time - a.time);
+    const bool long_enough = span().ns >= std::min(slope_span_, kLaterSpan);
+    const bool steep = std::abs(slope_) > kCrystalSlope;
+    const double bound = steep ? kSteepFactor * std::abs(slope_) : kCrystalSlope;
+    const double usual = long_enough ? std::clamp(best, -bound, bound) : slope_;
+    const bool other_rate = std::abs(best) <= kSteepest && kFarBetter * distanceOf(best) < distanceOf(usual);
+    if (long_enough || other_rate) {
+      slope_ = other_rate ? best : usual;
+      slope_known_ = true;
+      slope_span_ = span().ns;
+    }
   }
   reference_ = point(count_ - 1).time;
-  level_ = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < n; ++i) {
-    const Point& p = point(hull[i]);
-    level_ =
-        std::min(level_, static_cast<double>(p.value) - slope_ * static_cast<double>(p.time - reference_));
-  }
+  level_ = static_cast<double>(point(0).value) + levelOf(slope_) +
+           slope_ * static_cast<double>(reference_ - oldest);
   double sum = 0;
   double changes = 0;
   for (std::size_t i = 0; i < count_; ++i) {

@@ -4,8 +4,8 @@
 //
 // The lowest point of each quarter second is kept, for 32 s. The line is the edge of the points' lower convex
 // hull above the mean of their times: of all lines with no point below, it has the smallest sum of distances.
-// Its slope is bounded. While the points span too little time for a slope, the last known slope (or zero) is
-// used, through the lowest point.
+// Its slope is bounded by that of crystals, 150 ppm, unless the steeper line fits far better. While the
+// points span too little time for a slope, the last known slope (or zero) is used, through the lowest point.
 //
 // Cost: add() O(1); O(kBins), about 2 us, when a quarter second ends or a point lies below the line. Memory:
 // 2.1 KiB. Accepts any values within +-kStampLimit without overflow.
@@ -27,9 +27,6 @@ class LowerEnvelope {
   static constexpr std::size_t kBins = 128;
   static constexpr Duration kBinWidth = {250'000'000};
 
-  /// `max_slope`: largest |slope| of the line, 1e-6 = 1 ppm.
-  explicit LowerEnvelope(double max_slope) : max_slope_(max_slope) {}
-
   /// Adds one point. Times must not decrease.
   void add(Stamp time, std::int64_t value_ns);
   /// Drops all points and keeps the slope: a clock that has stepped still runs at the same rate.
@@ -40,6 +37,7 @@ class LowerEnvelope {
   [[nodiscard]] bool empty() const { return count_ == 0; }
   [[nodiscard]] std::size_t bins() const { return count_; }
   [[nodiscard]] Duration span() const;
+  /// 1e-6 = 1 ppm.
   [[nodiscard]] double slope() const { return slope_; }
   /// The line [ns]; call only if not empty. Saturates far from the points.
   [[nodiscard]] std::int64_t at(Stamp time) const;
@@ -69,7 +67,6 @@ class LowerEnvelope {
   void dropOldest();
   void fit();
 
-  double max_slope_;
   Stamp origin_;           ///< time of the first point since the restart
   std::int64_t base_ = 0;  ///< its value
   std::array<Point, kBins> points_{};

@@ -25,9 +25,6 @@ constexpr std::int64_t kLongestTrip = 10'000'000'000;  // longer: the answer to 
 
 }  // namespace
 
-TwoWayClockMap::TwoWayClockMap(double max_skew_ppm)
-    : back_(max_skew_ppm * kPpm), forth_(max_skew_ppm * kPpm) {}
-
 double TwoWayClockMap::uncertainty(Stamp remote) const {
   return (back_.uncertainty(remote) + forth_.uncertainty(remote)) / 2;
 }

@@ -37,9 +37,6 @@ struct ClockExchange {
 
 class TwoWayClockMap {
  public:
-  /// `max_skew_ppm`: as in ClockMapSettings.
-  explicit TwoWayClockMap(double max_skew_ppm = 150);
-
   Status add(const ClockExchange& exchange);
   /// Host stamp of a remote stamp; not made rising (see RisingStamps). Empty before the first exchange.
   [[nodiscard]] std::optional<Stamp> toHost(Stamp remote) const;

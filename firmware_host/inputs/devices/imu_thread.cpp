@@ -41,7 +41,7 @@ ImuThread::ImuThread(std::string name, std::unique_ptr<ImuLink> link, const ImuC
       journal_(std::move(name)),
       correction_(correction),
       delay_(delay),
-      clock_(ClockMapSettings{delay}),
+      clock_(delay),
       rate_(rate),
       restart_wait_(kFirstRestartWait) {}
 

@@ -70,6 +70,15 @@ void oneWay(int seeds) {
   link.wander_ppm = 1;
   link.jitter = Jitter::kExponential;
   row("exponential, 4 hours, wander", link, 2);
+  for (const double skew : {5000.0, -20'000.0}) {
+    LinkSettings oscillator;
+    oscillator.jitter = Jitter::kExponential;
+    oscillator.skew_ppm = skew;
+    row("exponential, " + std::to_string(static_cast<int>(skew)) + " ppm", oscillator, seeds);
+    oscillator.seconds = 200;
+    oscillator.step_every = 37;
+    row("exponential, " + std::to_string(static_cast<int>(skew)) + " ppm, steps", oscillator, seeds);
+  }
   link.seconds = 200;
   link.wander_ppm = 0;
   link.rate = 20;
@@ -82,6 +91,16 @@ void oneWay(int seeds) {
   row("no jitter", link, seeds);
   link.step_every = 37;
   row("no jitter, steps", link, seeds);
+  link.step_every = 0;
+  link.jitter = Jitter::kExponential;
+  link.in_order = true;
+  link.seconds = 120;
+  link.slew_at = 40;
+  link.slew_for = 30;
+  for (const double slew : {500.0, 20'000.0}) {
+    link.slew_ppm = slew;
+    row("exponential, slewed by " + std::to_string(static_cast<int>(slew)) + " ppm for 30 s", link, seeds);
+  }
 }
 
 void twoWay(int seeds) {

@@ -22,6 +22,8 @@ struct LinkSettings {
   double wander_ppm = 0;       ///< amplitude of a sine on the rate
   double wander_period = 240;  ///< [s]
   double warm_ppm_per_s = 0;   ///< the rate's change, for the first 100 s
+  double slew_ppm = 0;         ///< the rate's change from slew_at [s] for slew_for [s]
+  double slew_at = 0, slew_for = 0;
   Jitter jitter = Jitter::kUniform;
   double jitter_ms = 5;  ///< largest (uniform) or mean (exponential)
   double constant_ms = 3;
@@ -47,8 +49,9 @@ inline double jitterMs(const LinkSettings& link, Random& random) {
 inline double deviceSeconds(const LinkSettings& link, double t) {
   const double turn = 2 * std::numbers::pi / link.wander_period;
   const double warm = std::min(t, 100.0);
+  const double slewed = std::clamp(t - link.slew_at, 0.0, link.slew_for);
   return t - 1e-6 * (link.skew_ppm * t + link.wander_ppm * (1 - std::cos(turn * t)) / turn +
-                     link.warm_ppm_per_s * (warm * warm / 2 + warm * (t - warm)));
+                     link.warm_ppm_per_s * (warm * warm / 2 + warm * (t - warm)) + link.slew_ppm * slewed);
 }
 
 inline std::vector<Sample> simulateLink(const LinkSettings& link, std::uint64_t seed) {

@@ -75,6 +75,44 @@ TEST_CASE("One-way map: a crystal that wanders or warms up, an outage, hours", "
   CHECK(hours.status.resets == 0);
 }
 
+TEST_CASE("One-way map: oscillators that are no crystals", "[timesync]") {
+  for (const double skew : {500.0, 3000.0, 20'000.0}) {
+    for (const double sign : {1.0, -1.0}) {
+      for (const Jitter jitter : {Jitter::kUniform, Jitter::kExponential}) {
+        LinkSettings link;
+        link.skew_ppm = sign * skew;
+        link.jitter = jitter;
+        const test::ClockErrors steady = overSeeds(link, kSteadySeeds);
+        CHECK(test::quantile(steady.settled, 0.99) < kLimit / 4);
+        // The link's skew is of the host's clock, the status's of the sensor's.
+        CHECK(steady.status.skew_ppm == Approx(link.skew_ppm / (1 - 1e-6 * link.skew_ppm)).margin(3));
+        CHECK(steady.status.resets == 0);
+        link.seconds = 200;
+        link.step_every = 37;
+        link.largest_step = 0.02;
+        CHECK(test::quantile(overSeeds(link).settled, 0.99) < kLimit);
+      }
+    }
+  }
+}
+
+TEST_CASE("One-way map: a host's clock that is slewed for a while", "[timesync]") {
+  LinkSettings link;
+  link.jitter = Jitter::kExponential;
+  link.seconds = 120;
+  link.slew_at = 40;
+  link.slew_for = 30;
+  for (const double slew : {500.0, -500.0, 20'000.0, -20'000.0}) {
+    link.slew_ppm = slew;
+    test::ClockErrors errors;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) test::runClockMap(link, seed, errors);
+    CHECK(test::quantile(errors.settled, 0.9) < kLimit);
+    // After a change of the rate the old points lead for 2 s, until all later ones contradict them.
+    constexpr double kNoticed = 4;  // s, twice that
+    CHECK(test::quantile(errors.settled, 1) < kNoticed * std::abs(slew) * 1e-3);
+  }
+}
+
 TEST_CASE("One-way map: what it says of itself", "[timesync]") {
   LinkSettings link;
   link.skew_ppm = 40;
@@ -89,7 +127,7 @@ TEST_CASE("One-way map: what it says of itself", "[timesync]") {
   CHECK(ClockMap().lock() == LockState::kUnlocked);
   CHECK(!ClockMap().toHost({5}).has_value());
 
-  ClockMap known({.constant_delay = Duration::fromMilliseconds(3)});
+  ClockMap known(Duration::fromMilliseconds(3));
   Stamp host;
   Stamp truth;
   for (const test::Sample& s : test::simulateLink(link, 2)) {
