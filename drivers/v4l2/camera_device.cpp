@@ -147,15 +147,23 @@ DeviceFault CameraDevice::setRate() {
   const bool can =
       node_.call(VIDIOC_G_PARM, &parameters) == 0 && (capture.capability & V4L2_CAP_TIMEPERFRAME) != 0;
   if (!can) return {};
-  if (settings_.rate > 0) {
-    capture.timeperframe = {kRateNumerator,
-                            static_cast<std::uint32_t>(std::lround(settings_.rate * kRateNumerator))};
+  const double lowest = (1 - kRateTolerance) * settings_.rate;
+  double rate = settings_.rate;
+  if (settings_.triggered && rate > 0) {
+    // Of an unknown rate, a driver sets the nearest, which may be too slow for the trigger.
+    rate = std::max(rate,
+                    slowestOffered(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, lowest)
+                        .value_or(rate));
+  }
+  if (rate > 0) {
+    capture.timeperframe = {kRateNumerator, static_cast<std::uint32_t>(std::lround(rate * kRateNumerator))};
     if (node_.call(VIDIOC_S_PARM, &parameters) != 0)
       return VideoNode::callFault(errno, "setting the frame rate");
   }
   if (capture.timeperframe.numerator == 0) return {};
   facts_.rate = static_cast<double>(capture.timeperframe.denominator) / capture.timeperframe.numerator;
-  if (settings_.rate > 0 && std::abs(facts_.rate - settings_.rate) > kRateTolerance * settings_.rate) {
+  const bool differs = std::abs(facts_.rate - settings_.rate) > kRateTolerance * settings_.rate;
+  if (settings_.rate > 0 && differs && !(settings_.triggered && facts_.rate >= lowest)) {
     std::array<char, kOfferBytes> rates = {};
     writeRates(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, rates.data(), rates.size());
     return deviceFault(DeviceFaultKind::kChanged, 0, "requested %.4g frames per second, set %.4g; offers %s",

@@ -92,6 +92,23 @@ void forEachSize(const VideoNode& node, std::uint32_t code, const Visit& visit) 
   }
 }
 
+/// `visit(rate, discrete)`: if not discrete, the rate is the highest of a range.
+template <typename Visit>
+void forEachRate(const VideoNode& node, std::uint32_t fourcc, int width, int height, const Visit& visit) {
+  for (std::uint32_t i = 0; i < kMaxRates; ++i) {
+    v4l2_frmivalenum interval = {};
+    interval.index = i;
+    interval.pixel_format = fourcc;
+    interval.width = static_cast<std::uint32_t>(width);
+    interval.height = static_cast<std::uint32_t>(height);
+    if (node.call(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) return;
+    const bool discrete = interval.type == V4L2_FRMIVAL_TYPE_DISCRETE;
+    const v4l2_fract shortest = discrete ? interval.discrete : interval.stepwise.min;
+    visit(static_cast<double>(shortest.denominator) / std::max(1U, shortest.numerator), discrete);
+    if (!discrete) return;
+  }
+}
+
 CameraListing ask(const std::string& path) {
   CameraListing listing;
   listing.path = path;
@@ -140,20 +157,21 @@ void writeRates(const VideoNode& node, std::uint32_t fourcc, int width, int heig
                 std::size_t size) {
   Text text(out, size);
   std::array<char, kWordBytes> word = {};
-  for (std::uint32_t i = 0; i < kMaxRates; ++i) {
-    v4l2_frmivalenum interval = {};
-    interval.index = i;
-    interval.pixel_format = fourcc;
-    interval.width = static_cast<std::uint32_t>(width);
-    interval.height = static_cast<std::uint32_t>(height);
-    if (node.call(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) return;
-    const bool discrete = interval.type == V4L2_FRMIVAL_TYPE_DISCRETE;
-    const v4l2_fract shortest = discrete ? interval.discrete : interval.stepwise.min;
-    std::snprintf(word.data(), word.size(), "%s%.4g", discrete ? "" : "up to ",
-                  static_cast<double>(shortest.denominator) / std::max(1U, shortest.numerator));
+  forEachRate(node, fourcc, width, height, [&](double rate, bool discrete) {
+    std::snprintf(word.data(), word.size(), "%s%.4g", discrete ? "" : "up to ", rate);
     text.add(" ", word.data());
-    if (!discrete) return;
-  }
+  });
+}
+
+std::optional<double> slowestOffered(const VideoNode& node, std::uint32_t fourcc, int width, int height,
+                                     double at_least) {
+  std::optional<double> slowest;
+  forEachRate(node, fourcc, width, height, [&](double rate, bool discrete) {
+    if (rate < at_least) return;
+    const double offered = discrete ? rate : at_least;
+    slowest = std::min(slowest.value_or(offered), offered);
+  });
+  return slowest;
 }
 
 std::vector<CameraListing> listCameras() {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,9 @@ void writeSizes(const VideoNode& node, std::uint32_t fourcc, char* out, std::siz
 /// "10 20 30": the frame rates of one format and size.
 void writeRates(const VideoNode& node, std::uint32_t fourcc, int width, int height, char* out,
                 std::size_t size);
+/// The lowest frame rate of one format and size that is not below `at_least`; empty if there is none.
+[[nodiscard]] std::optional<double> slowestOffered(const VideoNode& node, std::uint32_t fourcc, int width,
+                                                   int height, double at_least);
 
 struct FormatOffer {
   std::string fourcc;

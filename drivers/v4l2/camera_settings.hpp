@@ -16,6 +16,7 @@ struct CameraDeviceSettings {
   int width = 0;                    ///< pixels; if two cameras share an image, of both halves
   int height = 0;
   double rate = 0;                   ///< frames per second; 0: unchanged
+  bool triggered = false;            ///< an external trigger gives the rate: a faster mode serves as well
   std::optional<Duration> exposure;  ///< manual; empty: unchanged
   std::optional<std::int32_t> gain;  ///< manual, in the driver's own units; empty: unchanged
   std::uint32_t buffers = 6;         ///< 4 to VideoNode::kMaxBuffers

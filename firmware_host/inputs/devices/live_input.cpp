@@ -120,14 +120,16 @@ CameraOrigin originOf(const CamerasGroup& group, const InputTopics& topics, std:
           group.device1,     group.pipeline1,     topics.camera[1]};
 }
 
-CameraDeviceSettings deviceSettings(const CamerasGroup& group, const std::string& path, int width,
+CameraDeviceSettings deviceSettings(const Settings& settings, const std::string& path, int width,
                                     int height) {
+  const CamerasGroup& group = settings.cameras;
   CameraDeviceSettings device;
   device.setPath(path.c_str());
   if (group.format != kAnyFormat) device.setFormat(group.format.c_str());
   device.width = width;
   device.height = height;
   device.rate = group.rate_hz;
+  device.triggered = !settings.trigger.chip.empty();
   if (group.exposure_ms > 0) device.exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);
   if (group.gain >= 0) device.gain = group.gain;
   return device;
@@ -137,7 +139,7 @@ std::unique_ptr<CameraSource> makeSource(const Settings& settings, const CameraO
                                          int height) {
   const CamerasGroup& group = settings.cameras;
   if (!origin.device.empty()) {
-    return std::make_unique<CameraDevice>(deviceSettings(group, origin.device, width, height));
+    return std::make_unique<CameraDevice>(deviceSettings(settings, origin.device, width, height));
   }
   std::optional<Duration> exposure;
   if (group.exposure_ms > 0) exposure = Duration::fromSeconds(group.exposure_ms * kFromMs);

@@ -245,6 +245,20 @@ TEST_CASE("A format, a size and a rate that it lacks are refused with what it of
   CHECK(!camera.isOpen());
 }
 
+TEST_CASE("A camera with an external trigger runs in the slowest mode that is fast enough", "[capture]") {
+  CameraDevice camera;
+  for (const auto& [asked, mode] : {std::pair(20.0, 20.0), {16.0, 20.0}, {21.0, 25.0}}) {
+    CameraDeviceSettings settings = stream::settings(cameraPath(0), "GREY", 752, 480, asked);
+    settings.triggered = true;
+    REQUIRE(camera.open(settings).ok());
+    CHECK(camera.facts().rate == Approx(mode));
+    camera.close();
+  }
+  CameraDeviceSettings settings = stream::settings(cameraPath(0), "GREY", 752, 480, 400);
+  settings.triggered = true;
+  CHECK(camera.open(settings).kind == DeviceFaultKind::kChanged);
+}
+
 TEST_CASE("An output node is no camera, and a camera that streams is busy for others", "[capture]") {
   CameraDevice first;
   CameraDevice second;
