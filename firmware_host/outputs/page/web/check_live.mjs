@@ -70,6 +70,9 @@ await inBrowser(executablePath, async (context, faults) => {
   process.kill(Number(replay), 'SIGINT');
   await page.waitForFunction(() => window.swiftletReport.live.state === 'ended', null, { timeout: 120000 });
   ended = true;
+  const stale = await page.evaluate(() => ['health', 'arming']
+    .map((part) => document.querySelector(`.live .${part}`).textContent).join(''));
+  if (stale) faults.push(`after the end the bar says: ${stale}`);
   const { documents, patches } = await page.evaluate(() => {
     const { documents, patches } = window.swiftletReport.live;
     return { documents, patches };

@@ -140,19 +140,21 @@ export class LiveView {
     const stuck = this.state === 'live' && now.silent_s > 1;
     this.bar.dataset.state = stuck ? 'silent' : this.state;
     this.parts.state.textContent = stuck ? `no state for ${number(now.silent_s, 0)} s` : words[this.state];
-    this.parts.health.textContent = now.health ? `${now.health}${now.epoch ? `, epoch ${now.epoch}` : ''}` : '';
-    const troubles = now.unsupervised ? [now.unsupervised]
-      : (now.troubles ?? []).map((t) => `${t.member} is ${t.condition}: ${t.text}`);
+    // Health and readiness to arm hold only as long as the run is heard.
+    const said = this.state === 'live' ? now : {};
+    this.parts.health.textContent = said.health ? `${said.health}${said.epoch ? `, epoch ${said.epoch}` : ''}` : '';
+    const troubles = said.unsupervised ? [said.unsupervised]
+      : (said.troubles ?? []).map((t) => `${t.member} is ${t.condition}: ${t.text}`);
     if (troubles.length > 0) this.parts.health.textContent += `: ${troubles.join('; ')}`;
-    if (now.waiting_for) this.parts.health.textContent += `: waits for ${now.waiting_for}`;
-    this.parts.health.dataset.health = now.health ?? '';
+    if (said.waiting_for) this.parts.health.textContent += `: waits for ${said.waiting_for}`;
+    this.parts.health.dataset.health = said.health ?? '';
     this.parts.time.textContent = now.t == null ? '' : `${number(now.t, 1)} s`;
     this.parts.position.textContent = now.position ? `at ${now.position.map((v) => number(v)).join(' ')} m` : '';
     this.parts.speed.textContent = now.speed == null ? '' : `${number(now.speed)} m/s${now.at_rest ? ', at rest' : ''}`;
-    const missing = now.arming?.missing ?? [];
-    this.parts.arming.textContent = !now.arming ? '' : now.arming.ready ? 'ready to arm'
+    const missing = said.arming?.missing ?? [];
+    this.parts.arming.textContent = !said.arming ? '' : said.arming.ready ? 'ready to arm'
       : `not ready to arm: ${[...new Set(missing.map((m) => m.condition))].join(', ')}`;
     this.parts.arming.title = missing.map((m) => `${m.condition}: ${m.what}; ${m.remedy}`).join('\n');
-    this.parts.arming.dataset.ready = now.arming ? String(now.arming.ready) : '';
+    this.parts.arming.dataset.ready = said.arming ? String(said.arming.ready) : '';
   }
 }
