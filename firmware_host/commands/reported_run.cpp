@@ -1,9 +1,10 @@
 #include "firmware_host/commands/reported_run.hpp"
 
+#include <exception>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
-#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/evaluation/confusion_picture.hpp"
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
@@ -21,20 +22,22 @@ ReportedRun readReportedRun(const std::string& folder, const std::string& given_
     try {
       truth = readTruth(source, true);
       truth.poses = onImageClock(std::move(truth.poses), cameraToImuShift(files.summary));
-    } catch (const InputError& error) {
-      // A log without truth is no error of the run; a truth given as an option must exist.
+    } catch (const std::exception& error) {
+      // A log without truth, or one that cannot be reached, is no error of the run; a truth given as an
+      // option must exist.
       if (!given_truth.empty()) throw;
       files.missing.push_back({"truth", error.what()});
     }
   }
   ReportedRun run;
-  const fs::path world = fs::is_directory(source) ? fs::path(source) : fs::path(log);
+  std::error_code unreachable;
+  fs::path world = fs::is_directory(source, unreachable) ? fs::path(source) : fs::path(log);
+  if (!fs::is_directory(world, unreachable)) world.clear();
   try {
-    if (!world.empty() && fs::exists(world / "truth" / "mesh.ply")) {
-      run.true_surface = (world / "truth" / "mesh.ply").string();
-    }
+    const fs::path surface = world / "truth" / "mesh.ply";
+    if (!world.empty() && fs::exists(surface, unreachable)) run.true_surface = surface.string();
     if (!world.empty()) run.labels = readLabelNames(world.string());
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
     files.missing.push_back({"labels.csv", error.what()});
   }
   run.view = viewOf(std::move(files), truth.poses, truth.name,

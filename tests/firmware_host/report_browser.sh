@@ -24,5 +24,10 @@ fi
 rm "$work/mono/summary.json"
 "$swiftlet" report "$work/mono" --out "$work/damaged.html" 2>"$work/notes"
 grep -q "summary.json: is missing" "$work/notes"
+# A log that cannot be reached takes its truth and images along, and nothing else.
+ln -s loop "$work/loop"
+sed -i "s|\"log\": \".*\"|\"log\": \"$work/loop\"|" "$work/stereo/summary.json"
+"$swiftlet" report "$work/stereo" --out "$work/unreachable.html" 2>"$work/notes"
+grep -q "truth: .*$work/loop" "$work/notes"
 # One browser for all: its start is what takes long.
 node "$page/check_page.mjs" "$browser" "$work/one.html" "$work/two.html" "$work/damaged.html"

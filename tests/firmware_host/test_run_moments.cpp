@@ -215,6 +215,12 @@ TEST_CASE("without its log a run has its poses, and it is said why there are no 
   CHECK(moments.missing()[0].what.find("--log") != std::string::npos);
   CHECK(moments.message(3, kLarge)["cameras"].empty());
   CHECK(embeddedMoments(moments, 1000).is_null());
+  // As in the folder of another user: the kernel gives another error than "no such file".
+  files.summary["run"]["log"] = folder.file(std::string(300, 'x'));
+  const RunMoments unreachable(files, "");
+  REQUIRE(unreachable.missing().size() == 1);
+  CHECK(unreachable.missing()[0].what.find("File name too long. Name the log with --log") !=
+        std::string::npos);
   // Named, it is taken; another one is not.
   CHECK(RunMoments(files, kLog).hasImages());
   files.first_image = flight.stamps.back() + Duration::fromSeconds(10);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <system_error>
 #include <variant>
 
 #include "drivers/input/input_error.hpp"
@@ -77,8 +78,9 @@ std::string logOf(const RunFiles& files) {
   if (log.empty()) {
     throw InputError(files.folder, 0, "", "has no recording, and its summary names no log", kRemedy);
   }
-  if (!std::filesystem::exists(log)) {
-    throw InputError(log, 0, "", "the run's log is not there any more", kRemedy);
+  std::error_code error;
+  if (!std::filesystem::exists(log, error)) {
+    throw InputError(log, 0, "", error ? error.message() : "the run's log is not there any more", kRemedy);
   }
   return log;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <numeric>
 
@@ -36,7 +37,7 @@ RunMoments::RunMoments(const RunFiles& files, const std::string& log)
     images_ = std::make_unique<LogImages>(log.empty() ? logOf(files) : log, mono, files.first_image,
                                           files.last_image);
     stamps_ = images_->stamps(0);
-  } catch (const InputError& error) {
+  } catch (const std::exception& error) {
     missing_.push_back({"images", error.what()});
     for (const TrajectoryPoint& point : poses_) stamps_.push_back(point.stamp);
   }
