@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 
 #include "drivers/input/input_error.hpp"
@@ -44,13 +46,17 @@ int report(const ReportOptions& options) {
   for (std::size_t i = 0; i < options.runs.size(); ++i) {
     const std::string truth =
         options.truth.empty() ? "" : options.truth[std::min(i, options.truth.size() - 1)];
-    runs.push_back(readReportedRun(options.runs[i], truth, settings));
-    for (const MissingFile& missing : runs.back().view.files.missing) {
-      fmt::print(stderr, "note: {}: {}: {}\n", options.runs[i], missing.file, missing.what);
-    }
+    ReportedRun& run = runs.emplace_back(readReportedRun(options.runs[i], truth, settings));
+    std::vector<MissingFile>& missing = run.view.files.missing;
     if (!options.plain && !options.no_images) {
-      RunMoments moments(runs.back().view.files, "");
-      runs.back().moments = embeddedMoments(moments, kMostImageBytes / options.runs.size());
+      RunMoments moments(run.view.files, "");
+      run.moments = embeddedMoments(moments, kMostImageBytes / options.runs.size());
+      // A run without a log has no images, which is no fault of the run folder.
+      std::ranges::copy_if(moments.missing(), std::back_inserter(missing),
+                           [](const MissingFile& one) { return one.file != "images"; });
+    }
+    for (const MissingFile& one : missing) {
+      fmt::print(stderr, "note: {}: {}: {}\n", options.runs[i], one.file, one.what);
     }
   }
   const ReportProgram page = options.plain ? ReportProgram{} : readReportProgram();

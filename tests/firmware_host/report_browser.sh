@@ -24,6 +24,10 @@ fi
 rm "$work/mono/summary.json"
 "$swiftlet" report "$work/mono" --out "$work/damaged.html" 2>"$work/notes"
 grep -q "summary.json: is missing" "$work/notes"
+printf x | dd of="$work/stereo/keyframes.swk" bs=1 seek=5000 conv=notrunc 2>/dev/null
+"$swiftlet" report "$work/stereo" --out "$work/keyframes.html" 2>"$work/notes"
+grep -q "keyframes.swk: damaged at byte" "$work/notes"
+grep -q '"file":"keyframes.swk"' "$work/keyframes.html"
 # A log that cannot be reached takes its truth and images along, and nothing else.
 ln -s loop "$work/loop"
 sed -i "s|\"log\": \".*\"|\"log\": \"$work/loop\"|" "$work/stereo/summary.json"
