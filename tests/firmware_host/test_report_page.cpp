@@ -283,7 +283,9 @@ TEST_CASE("a summary with the wrong kinds of values does no harm") {
        {"[]", "{}", R"({"run": 3, "health": {}, "timing": [], "settings": "x"})",
         R"({"run": {"log": 5, "cameras": "two", "first_image_ns": "x"}, "health": [1, {"stamp_ns": 1.5}],
                               "timing": {"track": 3, "smooth": {"frames": 1, "keyframes": {"cpu": 5, "wall":
-                              {"histogram": "x 1"}}}}, "memory": {"table_bytes": {"a": "b"}}, "warnings": {}})"}) {
+                              {"histogram": "x 1"}}}}, "memory": {"table_bytes": {"a": "b"}}, "warnings": {}})",
+        R"({"health": [{"stamp_ns": 1, "health": 5}],
+            "timing": {"track": {"frames": {"cpu": {"histogram": 5}}}}})"}) {
     INFO(text);
     std::ofstream(path) << text;
     const ReportedRun run = readRun(folder.file("run"));

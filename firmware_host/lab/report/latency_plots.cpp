@@ -42,8 +42,9 @@ Plot latencyPlot(const RunView& view, const std::string& stage, const Json& kind
             {}};
   for (const auto& [kind, figures] : kinds.items()) {
     if (!figures.is_object() || !figures.contains(time) || !figures[time].is_object()) continue;
-    const std::string text = figures[time].value("histogram", std::string());
-    const Series series = histogramSeries(kind == "all" ? "all" : kind, text);
+    const Json text = figures[time].value("histogram", Json());
+    if (!text.is_string()) continue;
+    const Series series = histogramSeries(kind, text.get<std::string>());
     if (!series.x.empty()) plot.series.push_back(series);
   }
   for (const auto& [figure, allowed] : budgetsOf(view, stage, time)) {

@@ -28,8 +28,9 @@ Json healthJson(const RunView& view) {
     for (const Json& change : history) {
       if (!change.is_object() || !change.contains("stamp_ns") || !change["stamp_ns"].is_number_integer())
         continue;
-      begin(files.seconds(Stamp{change["stamp_ns"].get<std::int64_t>()}), change.value("health", "unknown"),
-            change.value("epoch", Json(nullptr)));
+      const Json health = change.value("health", Json());
+      begin(files.seconds(Stamp{change["stamp_ns"].get<std::int64_t>()}),
+            health.is_string() ? health.get<std::string>() : "unknown", change.value("epoch", Json(nullptr)));
     }
   } else {
     for (const EventLine& event : files.events) {
