@@ -28,6 +28,8 @@ class RunPlayer::Work {
  public:
   Work(const ReportedRun& run, std::unique_ptr<RunMoments> moments, const ViewAddress& address)
       : page_(pageOf(run)), moments_(std::move(moments)) {
+    // A page of an earlier live view that asks for its stream is refused.
+    hub_.end();
     ViewPages pages;
     pages.page = [this] { return page_; };
     pages.text = [] { return std::string("The page is at /\n"); };

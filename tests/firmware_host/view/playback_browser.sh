@@ -39,6 +39,8 @@ finish() {
 cp -r "$log" "$work/log"
 "$swiftlet" replay "$work/log" --set smoother.horizon=full --mesh-sequence --out "$work/run" >"$work/replay.log"
 serve images "$work/run" 127.0.0.1:0
+# There is nothing to follow: the pages of an earlier live view hold no answering threads.
+node -e 'fetch(process.argv[1]).then((answer) => process.exit(answer.status === 503 ? 0 : 1))' "${url}stream"
 node "$page/check_playback.mjs" "$browser" "$url" images $screenshot
 finish
 mv "$work/log" "$work/elsewhere"
