@@ -4,6 +4,7 @@
 #include <rosbag/view.h>
 
 #include <cstring>
+#include <exception>
 
 #include "drivers/input/input_error.hpp"
 
@@ -84,7 +85,8 @@ class Ros1File final : public BagFile {
   void translated(Call&& call) const {
     try {
       call();
-    } catch (const rosbag::BagException& error) {
+    } catch (const std::exception& error) {
+      // Not only rosbag's: damaged lengths and types reach boost, pluginlib and the allocator.
       throw InputError(path_, 0, "", std::string("not a readable bag (") + error.what() + ")",
                        "`rosbag reindex` repairs an interrupted recording");
     }
@@ -106,7 +108,7 @@ class Ros1Writer final : public BagWriter {
   ~Ros1Writer() override {
     try {
       bag_->close();
-    } catch (const rosbag::BagException&) {
+    } catch (const std::exception&) {
       // Leaked on purpose: its destructor would try to close it again and throw.
       static_cast<void>(bag_.release());
     }
@@ -159,7 +161,7 @@ class Ros1Writer final : public BagWriter {
   void translated(Call&& call) const {
     try {
       call();
-    } catch (const rosbag::BagException& error) {
+    } catch (const std::exception& error) {
       throw InputError(path_, 0, "", std::string("cannot be written (") + error.what() + ")",
                        "Check that the folder exists and is writable and the disk is not full");
     }

@@ -8,6 +8,7 @@
 
 #include "drivers/bag/mcap_file.hpp"
 #include "drivers/bag/message_coder.hpp"
+#include "drivers/bag/ros1_file.hpp"
 #include "drivers/bag/rosbag2_folder.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/grey_copier.hpp"
@@ -43,6 +44,31 @@ void readImage(std::span<const std::uint8_t> body, BagEncoding encoding) {
   demand(result == DecodeResult::kDamaged || found == size);
 }
 
+/// Entries are in order and each message can be read, or the error names the file.
+template <typename Open>
+void readBagFile(std::string_view text, Open&& open, bool names_byte) {
+  const int file = ::memfd_create("bag", MFD_CLOEXEC);
+  demand(file >= 0 && ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()));
+  try {
+    const auto bag = open("/proc/self/fd/" + std::to_string(file), "bag");
+    Stamp newest{};
+    std::size_t counted = 0;
+    for (const BagTopic& topic : bag->topics()) counted += topic.messages;
+    demand(counted == bag->entries().size());
+    for (const BagEntry& entry : bag->entries()) {
+      demand(entry.topic < bag->topics().size() && newest <= entry.log_time);
+      newest = entry.log_time;
+      std::uint8_t sum = 0;  // each byte is looked at
+      for (const std::uint8_t byte : bag->read(entry)) sum = static_cast<std::uint8_t>(sum + byte);
+      (void)sum;
+    }
+  } catch (const InputError& error) {
+    demand(error.file.starts_with("bag") && !error.remedy.empty());
+    demand(!names_byte || error.field.starts_with("byte "));
+  }
+  ::close(file);
+}
+
 }  // namespace
 
 void rosMessage(std::string_view text) {
@@ -59,27 +85,9 @@ void rosMessage(std::string_view text) {
   }
 }
 
-void mcap(std::string_view text) {
-  const int file = ::memfd_create("bag", MFD_CLOEXEC);
-  demand(file >= 0 && ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size()));
-  try {
-    const auto bag = openMcapFile("/proc/self/fd/" + std::to_string(file), "bag");
-    Stamp newest{};
-    std::size_t counted = 0;
-    for (const BagTopic& topic : bag->topics()) counted += topic.messages;
-    demand(counted == bag->entries().size());
-    for (const BagEntry& entry : bag->entries()) {
-      demand(entry.topic < bag->topics().size() && newest <= entry.log_time);
-      newest = entry.log_time;
-      std::uint8_t sum = 0;  // each byte is looked at
-      for (const std::uint8_t byte : bag->read(entry)) sum = static_cast<std::uint8_t>(sum + byte);
-      (void)sum;
-    }
-  } catch (const InputError& error) {
-    demand(error.field.starts_with("byte "));
-  }
-  ::close(file);
-}
+void mcap(std::string_view text) { readBagFile(text, openMcapFile, true); }
+
+void ros1Bag(std::string_view text) { readBagFile(text, openRos1File, false); }
 
 void rosbag2Metadata(std::string_view text) {
   try {
