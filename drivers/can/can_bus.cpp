@@ -61,9 +61,9 @@ CanFrame frameOf(const canfd_frame& raw, bool fd) {
   return frame;
 }
 
-/// Copies the interface's name into a request; false if the name is empty.
+/// Copies the interface's name, not too long, into a request; false if the name is empty.
 bool nameOf(const CanBusSettings& settings, ifreq& request) {
-  std::snprintf(request.ifr_name, sizeof(request.ifr_name), "%s", settings.interface.data());
+  std::copy_n(settings.interface.data(), sizeof(request.ifr_name), request.ifr_name);
   return request.ifr_name[0] != '\0';
 }
 
@@ -75,6 +75,14 @@ void CanBusSettings::setInterface(const char* name) {
 
 void CanBusSettings::addFilter(CanFilter filter) {
   if (filter_count < filters.size()) filters[filter_count++] = filter;
+}
+
+DeviceFault CanBusSettings::nameFault() const {
+  if (std::strlen(interface.data()) < IFNAMSIZ) return {};
+  return deviceFault(DeviceFaultKind::kMissing, 0,
+                     "no network interface %s: names have at most %d characters; `ip -br link` lists the "
+                     "available ones",
+                     interface.data(), IFNAMSIZ - 1);
 }
 
 DeviceFault CanBus::interfaceFault(int error) const {
@@ -99,6 +107,7 @@ DeviceFault CanBus::open(const CanBusSettings& settings) {
   close();
   settings_ = settings;
   warning_ = {};
+  if (const DeviceFault fault = settings_.nameFault(); !fault.ok()) return fault;
   fd_ = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd_ < 0) return interfaceFault(errno);
   const DeviceFault fault = setUp();

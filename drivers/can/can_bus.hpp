@@ -29,7 +29,8 @@ struct CanFilter {
 };
 
 struct CanBusSettings {
-  std::array<char, 16> interface = {};  ///< "can0"
+  /// "can0". Room for more than the kernel's 15 characters, so that open() can refuse a longer name.
+  std::array<char, 64> interface = {};
   bool fd = false;  ///< true: also FD frames; refused if the interface is set up for classic frames only
   std::array<CanFilter, 4> filters = {};
   std::size_t filter_count = 0;  ///< 0: every frame
@@ -38,6 +39,8 @@ struct CanBusSettings {
 
   void setInterface(const char* name);
   void addFilter(CanFilter filter);
+  /// kMissing if the name is longer than any interface's.
+  [[nodiscard]] DeviceFault nameFault() const;
 };
 
 struct CanBusCounters {

@@ -138,6 +138,7 @@ class CanWire : public ImuWire {
 
  private:
   DeviceFault setUp(bool up) const {
+    if (const DeviceFault fault = settings_.nameFault(); !fault.ok()) return fault;
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return openFault(errno, "a socket");
     ifreq request{};

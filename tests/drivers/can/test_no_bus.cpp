@@ -26,6 +26,21 @@ TEST_CASE("A bus that is not there says what to do, and gives nothing", "[can]")
   }
 }
 
+TEST_CASE("A name longer than any interface's is refused, not cut to another's", "[can]") {
+  const std::string first_of_it = "can_of_the_fron";
+  for (const std::string& rest :
+       {std::string("t"), std::string("t_left_wing_and_much_more_than_the_settings_hold")}) {
+    CanBusSettings settings;
+    settings.setInterface((first_of_it + rest).c_str());
+    CanBus bus;
+    const DeviceFault fault = bus.open(settings);
+    CHECK(fault.kind == DeviceFaultKind::kMissing);
+    CHECK(fault.text().find(first_of_it + "t") != std::string::npos);
+    CHECK(fault.text().find("at most 15 characters") != std::string::npos);
+    CHECK(!bus.isOpen());
+  }
+}
+
 TEST_CASE("An FD frame has only certain lengths", "[can]") {
   CHECK(fdFrameSize(0) == 0);
   CHECK(fdFrameSize(7) == 7);
