@@ -107,12 +107,19 @@ class Rosbag2Writer final : public BagWriter {
           topic.about.name, ros2Type(topic.about.type), escaped(qosText(topic.about.latched)),
           topic.messages);
     }
+    const std::string file = quoted(file_);
     text +=
-        "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - " + file_ + "\n";
-    return text + "  files:\n    - path: " + file_ + "\n" + indented(times, "      ");
+        "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n    - " + file + "\n";
+    return text + "  files:\n    - path: " + file + "\n" + indented(times, "      ");
   }
   static std::string indented(const std::string& form, const char* blanks) {
     return fmt::format(fmt::runtime(form), blanks);
+  }
+  /// In single quotes: the user chooses the name, and ` #` or `: ` would end a plain YAML scalar.
+  static std::string quoted(const std::string& text) {
+    std::string out = "'";
+    for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
+    return out + "'";
   }
   static std::string escaped(const std::string& text) {
     std::string out;

@@ -128,6 +128,16 @@ TEST_CASE("what our writer writes is read back", "[rosbag2]") {
   CHECK(bag->warnings().empty());
 }
 
+TEST_CASE("a bag is found in its folder whatever the folder's name", "[rosbag2]") {
+  const BagFolder folder;
+  const auto messages = someMessages(3, 10);
+  for (const char* name : {"run #2", "room: second try", "it's", "{a}", "- b"}) {
+    INFO(name);
+    test::write(*makeRosbag2Writer(folder.file(name), name), messages);
+    CHECK(readBack(folder.file(name)) == messages);
+  }
+}
+
 TEST_CASE("a bag of several files is one, packed and of other storage too", "[rosbag2]") {
   const BagFolder folder;
   const std::vector<PlainMessage> messages = someMessages(90, 2000);

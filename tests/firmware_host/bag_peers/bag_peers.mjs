@@ -73,7 +73,7 @@ class Database {
 /** Decoded with the definitions of @foxglove/rosbag2, not with ours. */
 async function readRosbag2(folder) {
   const text = fs.readFileSync(path.join(folder, "metadata.yaml"), "utf8");
-  const name = /relative_file_paths:\n\s*- (.*)\n/.exec(text)[1];
+  const name = /relative_file_paths:\n\s*- '(.*)'\n/.exec(text)[1];
   const bag = new rosbag2.Rosbag2([new Database(await initSql(), path.join(folder, name))]);
   await bag.open();
   const messages = [];
