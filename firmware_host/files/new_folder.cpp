@@ -17,14 +17,18 @@ fs::path folderOf(const std::string& path) {
 
 }  // namespace
 
+void refuseExisting(const std::string& path) {
+  std::error_code error;
+  if (!fs::exists(folderOf(path), error)) return;
+  throw InputError(path, 0, "", "already exists and is never overwritten",
+                   "Choose another folder or remove this one");
+}
+
 NewFolder::NewFolder(const std::string& path, std::vector<std::string> names)
     : path_(folderOf(path)), part_(path_.string() + ".part"), names_(std::move(names)) {
-  std::error_code error;
-  if (fs::exists(path_, error)) {
-    throw InputError(path, 0, "", "already exists and is never overwritten",
-                     "Choose another folder or remove this one");
-  }
+  refuseExisting(path);
   removeFiles();
+  std::error_code error;
   fs::create_directories(part_, error);
   if (error) throw InputError(part_.string(), 0, "", error.message(), "Choose a folder that can be created");
 }

@@ -9,6 +9,9 @@
 
 namespace swiftlet {
 
+/// InputError if there is a file or folder at `path`.
+void refuseExisting(const std::string& path);
+
 class NewFolder {
  public:
   /// `names`: all files that may be in the folder. Files of these names left by a killed run are removed.

@@ -62,9 +62,11 @@ class FlightRun {
       return result_;
     }
     memory_.note("devices");
+    LoopInputs inputs = readLoopInputs(settings_, request_.kept_maps.keep);
     result_.out = claimFolder(request_, settings_, claim_, lost_);
     output_.emplace(result_.out, settings_, calibration_,
-                    RunOutput::Wanted{request_.imu_rate, false, request_.kept_maps.keep, true}, lost_);
+                    RunOutput::Wanted{request_.imu_rate, false, request_.kept_maps.keep, true},
+                    std::move(inputs), lost_);
     if (request_.record) recorder_ = output_->startRecorder(RecordOrder::kByArrival);
     fly();
     end();

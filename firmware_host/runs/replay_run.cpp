@@ -154,10 +154,11 @@ class ReplayRun {
   void begin() {
     facts_.mono = !settings_.odometry.use_stereo || source_->rig().camera_count < 2;
     refuseOwnLog();
+    LoopInputs inputs = readLoopInputs(settings_, request_.kept_maps.keep);
     claim_.emplace(request_.out, RunKind::kReplay, request_.replace);
     output_.emplace(request_.out, settings_, source_->calibration(),
                     RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence, request_.kept_maps.keep},
-                    lost_);
+                    std::move(inputs), lost_);
     progress_.emplace("replay", request_.show_progress ? steps_ : 0);
     control_.stop = request_.stop;
     control_.progress = [this](std::uint64_t images) { progress_->update(images); };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "drivers/input/input_error.hpp"
+#include "firmware_host/files/new_folder.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "firmware_host/outputs/map_files/kept_folder.hpp"
@@ -14,6 +15,19 @@
 #include "firmware_host/settings/read_settings.hpp"
 
 namespace swiftlet {
+
+LoopInputs readLoopInputs(const Settings& settings, const std::string& keep_map) {
+  LoopInputs inputs;
+  const std::string& vocabulary = settings.loop.vocabulary;
+  if (settings.loop.enabled && !vocabulary.empty()) {
+    inputs.vocabulary = std::make_unique<const Vocabulary>(readVocabulary(vocabulary));
+  }
+  if (!settings.loop.in_map.empty()) {
+    inputs.kept_map = std::make_unique<const KeptGraph>(readKeptFolder(settings.loop.in_map));
+  }
+  if (!keep_map.empty()) refuseExisting(keep_map);
+  return inputs;
+}
 
 template <typename Write>
 void RunOutput::attempt(const Write& write) const {
@@ -30,20 +44,19 @@ void RunOutput::attempt(const Write& write) const {
 }
 
 RunOutput::RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration,
-                     Wanted wanted, LostFiles& lost)
+                     Wanted wanted, LoopInputs inputs, LostFiles& lost)
     : out_(out),
       settings_(settings),
       calibration_(calibration),
       wanted_(wanted),
       lost_(lost),
-      kept_map_(settings.loop.in_map.empty()
-                    ? nullptr
-                    : std::make_unique<const KeptGraph>(readKeptFolder(settings.loop.in_map))),
+      inputs_(std::move(inputs)),
       recorder_(out,
-                {wanted.imu_rate, wanted.mesh_sequence, kept_map_ != nullptr, wanted.keep_map, wanted.fly_on},
+                {wanted.imu_rate, wanted.mesh_sequence, inputs_.kept_map != nullptr, wanted.keep_map,
+                 wanted.fly_on},
                 lost),
       observer_(recorder_) {
-  if (kept_map_) observer_.awaitLocation(kept_map_->nodes.size());
+  if (inputs_.kept_map) observer_.awaitLocation(inputs_.kept_map->nodes.size());
   attempt([&] { writeWholeFile(out_ / "settings.yaml", printSettings(settings_, false) + "\n"); });
   if (!settings_.full_smoothing) return;
   attempt([&] {
@@ -53,22 +66,15 @@ RunOutput::RunOutput(const std::string& out, const Settings& settings, const Cal
   });
 }
 
-const Vocabulary* RunOutput::vocabulary() {
-  const std::string& file = settings_.loop.vocabulary;
-  if (!settings_.loop.enabled || file.empty()) return nullptr;
-  if (!vocabulary_) vocabulary_ = std::make_unique<const Vocabulary>(readVocabulary(file));
-  return vocabulary_.get();
-}
-
 GraphOptions RunOutput::graphOptions() {
   GraphOptions options;
   options.imu_states = wanted_.imu_rate;
   options.meshes = wanted_.mesh_sequence;
-  options.vocabulary = vocabulary();
-  options.kept_map = kept_map_.get();
+  options.vocabulary = inputs_.vocabulary.get();
+  options.kept_map = inputs_.kept_map.get();
   options.storage = &recorder_.storage();
   if (const std::string volume = keptVolumeOf(settings_.loop.in_map);
-      kept_map_ && std::filesystem::exists(volume)) {
+      inputs_.kept_map && std::filesystem::exists(volume)) {
     options.kept_volume = [volume](MapSubmaps& to, std::span<const WorldInMap> nodes) {
       readKeptSubmaps(volume, to, nodes);
     };

@@ -20,6 +20,16 @@
 
 namespace swiftlet {
 
+/// What loop closure reads before a run.
+struct LoopInputs {
+  std::unique_ptr<const Vocabulary> vocabulary;  ///< null: the shipped one
+  std::unique_ptr<const KeptGraph> kept_map;     ///< map in which the run is located; null: none
+};
+
+/// Call before the run's folder is claimed: a claim deletes the earlier run in it. InputError if a file is
+/// refused, or if the folder `keep_map` exists (empty: no map is kept).
+[[nodiscard]] LoopInputs readLoopInputs(const Settings& settings, const std::string& keep_map);
+
 class RunOutput {
  public:
   struct Wanted {
@@ -32,11 +42,9 @@ class RunOutput {
   /// `out` exists and is claimed by the run (run_claim.hpp); empty: there is no folder, and nothing is
   /// written. Settings, calibration and `lost` outlive this object.
   RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration, Wanted wanted,
-            LostFiles& lost);
+            LoopInputs inputs, LostFiles& lost);
 
   [[nodiscard]] RunObserver& observer() { return observer_; }
-  /// Vocabulary for loop closure; null: the shipped one.
-  [[nodiscard]] const Vocabulary* vocabulary();
   /// Graph options that depend on this folder.
   [[nodiscard]] GraphOptions graphOptions();
   /// Writes `recording/`. `depth_sensor`: the map's; null: none. Returns null if it cannot be written
@@ -69,8 +77,7 @@ class RunOutput {
   Wanted wanted_;
   LostFiles& lost_;
   bool keeps_keyframes_ = false;
-  std::unique_ptr<const Vocabulary> vocabulary_;
-  std::unique_ptr<const KeptGraph> kept_map_;
+  LoopInputs inputs_;
   RunRecorder recorder_;
   RunObserver observer_;
 };

@@ -132,8 +132,8 @@ TEST_CASE("a folder that takes no file costs each of them, or the run where it h
   const Settings settings;
   Calibration calibration;
   calibration.rig = oneCamera();
-  CHECK_THROWS_AS(RunOutput(gone, settings, calibration, {.imu_rate = true}, lost), InputError);
-  RunOutput output(gone, settings, calibration, {.imu_rate = true, .fly_on = true}, lost);
+  CHECK_THROWS_AS(RunOutput(gone, settings, calibration, {.imu_rate = true}, {}, lost), InputError);
+  RunOutput output(gone, settings, calibration, {.imu_rate = true, .fly_on = true}, {}, lost);
   CHECK(lost.count() >= 6);  // settings.yaml, four streams, keyframes.swk
   CHECK_THAT(lost.problem(), Catch::Contains("No such file or directory"));
   CHECK(output.startRecorder(RecordOrder::kByArrival) != nullptr);  // makes its folders itself
@@ -148,7 +148,7 @@ TEST_CASE("a recorder that cannot begin is lost, not the flight", "[files]") {
   const Settings settings;
   Calibration calibration;
   calibration.rig = oneCamera();
-  RunOutput output(folder.path(), settings, calibration, {.fly_on = true}, lost);
+  RunOutput output(folder.path(), settings, calibration, {.fly_on = true}, {}, lost);
   CHECK(output.startRecorder(RecordOrder::kByArrival) == nullptr);
   REQUIRE(lost.problem() != nullptr);
   CHECK_THAT(lost.problem(), Catch::Contains("recording"));
@@ -160,7 +160,7 @@ TEST_CASE("a summary that finds no room leaves no half of one", "[files]") {
   const Settings settings;
   Calibration calibration;
   calibration.rig = oneCamera();
-  RunOutput output(folder.path(), settings, calibration, {.fly_on = true}, lost);
+  RunOutput output(folder.path(), settings, calibration, {.fly_on = true}, {}, lost);
   RunFacts facts;
   output.close(facts);
   constexpr rlim_t kLimit = 1000;

@@ -192,6 +192,33 @@ TEST_CASE("a replay is complete without a truth that can be read") {
   CHECK(summary["warnings"].dump().find("state_groundtruth_estimate0/data.csv") != std::string::npos);
 }
 
+TEST_CASE("a replay that is refused leaves an earlier run whole, and no new folder") {
+  const ScratchFolder folder("refused_replay");
+  const std::string log = folder.file("log");
+  REQUIRE(run({"simulate", "--tracks", "--duration", "0.3", "--out", log}) == kExitDone);
+  const std::string earlier = folder.file("earlier");
+  const std::string fresh = folder.file("fresh");
+  const std::string taken = folder.file("taken");
+  std::filesystem::create_directory(earlier);
+  std::filesystem::create_directory(taken);
+  std::ofstream(earlier + "/swiftlet_run.txt") << "replay\n";
+  std::ofstream(earlier + "/odometry.tum") << "poses";
+  const std::vector<std::vector<std::string>> refused = {
+      {"--in-map", taken},
+      {"--keep-map", taken},
+      {"--loop-closure", "--set", "loop.vocabulary=" + folder.file("none")}};
+  for (const std::vector<std::string>& options : refused) {
+    INFO(options.back());
+    for (const std::string& out : {earlier, fresh}) {
+      std::vector<std::string> arguments = {"replay", log, "--out", out};
+      arguments.insert(arguments.end(), options.begin(), options.end());
+      CHECK(run(arguments) == kExitBadInput);
+    }
+    CHECK(test::textOf(earlier + "/odometry.tum") == "poses");
+    CHECK_FALSE(std::filesystem::exists(fresh));
+  }
+}
+
 TEST_CASE("evaluate compares two files; without common stamps it fails") {
   const ScratchFolder folder("evaluate");
   const std::string truth = folder.file("truth.tum");
