@@ -131,8 +131,9 @@ class Checker {
   explicit Checker(const HilEvidence& evidence) : e_(evidence) {}
 
   std::vector<HilCheck> operator()() {
-    add("played", e_.complete, "complete, each image in time", "incomplete, or some images late");
-    add("ended", e_.finished, "the flight ended as requested",
+    add("log played to its end, no image late", e_.complete, "complete, each image in time",
+        "incomplete, or some images late");
+    add("flight ended as requested", e_.finished, "its summary says so",
         "the flight has no summary, or did not finish");
     std::array<bool, 4> seen{};
     for (const PlannedFault& fault : e_.faults.faults()) {
@@ -192,6 +193,8 @@ class Checker {
     const bool steps = fault.kind == PlannedFaultKind::kClockStep;
     if (!after || (!steps && shown.length() < *after) || until > played()) return;
     const std::string device = deviceStart(fault.device);
+    const std::string check = fmt::format("reported with a remedy within {:g} s of its end: {}",
+                                          kToldWithin.seconds(), faultName(fault));
     for (const HilEvidence::Line& line : e_.remarks) {
       const Duration at = time(line.stamp);
       if (at < from || at > until || !line.text.starts_with(device)) continue;
@@ -199,10 +202,10 @@ class Checker {
         return line.text.find(word) != std::string::npos;
       });
       if (!says || line.text.find("; ") == std::string::npos) continue;
-      add("told: " + faultName(fault), true, fmt::format("at {:.2f} s: {}", at.seconds(), line.text), "");
+      add(check, true, fmt::format("at {:.2f} s: {}", at.seconds(), line.text), "");
       return;
     }
-    add("told: " + faultName(fault), false, "",
+    add(check, false, "",
         fmt::format(
             "no line of events.log from {:.2f} to {:.2f} s names the device, the fault and the remedy",
             from.seconds(), until.seconds()));
@@ -230,8 +233,9 @@ class Checker {
       }
     }
     const std::string& stands = fault.empty() ? defect : fault;
-    add(fmt::format("returned: {}", name(device)), stands.empty(),
-        fmt::format("no fault reported {:.0f} s after its last fault", kRecovered.seconds()),
+    add(fmt::format("no longer reported as faulty {:g} s after its last fault: {}", kRecovered.seconds(),
+                    name(device)),
+        stands.empty(), fmt::format("works at {:.2f} s", until.seconds()),
         fmt::format("still reported at {:.2f} s: {}", until.seconds(), stands));
   }
 
@@ -254,7 +258,9 @@ class Checker {
     const Duration until = std::min(fault.begin + fault.length, played());
     if (from >= until) return;
     const HilEvidence::Judged* good = firstOf(from, until, Health::kGood, true);
-    add("lowered: " + faultName(fault), good == nullptr,
+    add(fmt::format("health not good from {:g} s after its start to its end: {}", kLowered.seconds(),
+                    faultName(fault)),
+        good == nullptr,
         fmt::format("no state is good from {:.2f} to {:.2f} s", from.seconds(), until.seconds()),
         good == nullptr ? "" : fmt::format("good at {:.3f} s", time(good->stamp).seconds()));
   }
@@ -279,7 +285,8 @@ class Checker {
       if (since < Duration{}) since = at;
       if (at - since < kBlindFailed) continue;
       if (const HilEvidence::Judged* other = firstOf(at, at + kStep, Health::kFailed, false)) {
-        add("failed while blind", false, "",
+        add(fmt::format("health failed from {:g} s without a usable image", kBlindFailed.seconds()), false,
+            "",
             fmt::format("{} at {:.3f} s, blind since {:.2f} s", healthName(other->health),
                         time(other->stamp).seconds(), since.seconds()));
         return;
@@ -291,12 +298,12 @@ class Checker {
     const Duration from = calm();
     if (e_.faults.faults().empty() || from + kRecovered > played()) return;
     const HilEvidence::Judged* good = firstOf(from, from + kRecovered, Health::kGood, true);
-    add("recovered", good != nullptr,
+    add(fmt::format("health good within {:g} s of the last fault's end", kRecovered.seconds()),
+        good != nullptr,
         good == nullptr
             ? ""
             : fmt::format("good {:.2f} s after the last fault", (time(good->stamp) - from).seconds()),
-        fmt::format("not good within {:.0f} s of the last fault's end at {:.2f} s", kRecovered.seconds(),
-                    from.seconds()));
+        fmt::format("not good; the last fault ended at {:.2f} s", from.seconds()));
   }
 
   /// Compares the motion over a second with the truth's, within stretches of good poses.
@@ -326,11 +333,15 @@ class Checker {
       if (*error > worst) at = time(poses[i].stamp);
       worst = std::max(worst, *error);
     }
-    const std::string says = fmt::format(
-        "worst of {}: {:.4f} m over 1 s (at {:.2f} s, {} compared), {:.4f} m a step (at {:.2f} s)", what,
-        worst, at.seconds(), compared, worst_step, step_at.seconds());
-    add("no wrong pose is good: " + what, compared > 0 && worst <= kWrongMotion && worst_step <= kWrongStep,
-        says, says + fmt::format("; allowed {:g} and {:g} m, and at least one", kWrongMotion, kWrongStep));
+    std::string check = fmt::format("good {}: motion wrong by at most {:g} m over 1 s", what, kWrongMotion);
+    std::string says = fmt::format("largest error {:.4f} m over 1 s (at {:.2f} s, {} compared)", worst,
+                                   at.seconds(), compared);
+    if (steps) {
+      check += fmt::format(", {:g} m between images", kWrongStep);
+      says += fmt::format(", {:.4f} m between images (at {:.2f} s)", worst_step, step_at.seconds());
+    }
+    add(check, compared > 0 && worst <= kWrongMotion && worst_step <= kWrongStep, says,
+        compared > 0 ? says : "no second of good poses has truth to compare with");
   }
 
   [[nodiscard]] std::optional<double> motionError(const HilEvidence::Judged& a,

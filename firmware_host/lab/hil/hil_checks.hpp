@@ -11,7 +11,7 @@
 namespace swiftlet {
 
 struct HilCheck {
-  std::string name;  ///< "told: imu unplug at 4.000 s"
+  std::string name;  ///< the quantity and its limit
   bool passed = false;
   std::string says;  ///< the finding, in one sentence
 };
