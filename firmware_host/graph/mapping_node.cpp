@@ -215,7 +215,8 @@ void MappingNode::report(RunStatistics& statistics) const {
 
 void MappingNode::addLosses(std::map<std::string, std::uint64_t>& losses) const {
   Node::addLosses(losses);
-  if (without_image_ > 0) losses["frames_unmapped"] += without_image_;
+  const std::uint64_t unmapped = without_image_ + without_scene_;
+  if (unmapped > 0) losses["frames_unmapped"] += unmapped;
   if (!held_) return;
   const std::uint64_t without_labels = held_->counters().late + held_->counters().no_room;
   if (without_labels > 0) losses["map_frames_without_labels"] += without_labels;

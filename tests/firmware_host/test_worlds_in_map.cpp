@@ -1,10 +1,11 @@
-// Where the odometry's world lies in the map, as the map of a long flight is told it.
+// The map's nodes: where the odometry's world lies in the map of a long flight; frames that are not mapped.
 
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <memory>
 
 #include "firmware_host/graph/loop_node.hpp"
+#include "firmware_host/graph/mapping_node.hpp"
 
 namespace swiftlet {
 namespace {
@@ -81,6 +82,30 @@ TEST_CASE("the map is told of the newest keyframes of any flight that extends a 
             return b.frame - a.frame != listed[1].frame - listed[0].frame;
           }) == listed.end());
   }
+}
+
+TEST_CASE("a frame whose depth or images are gone is listed as not mapped") {
+  Settings settings;
+  settings.map_stage.volume_mib = 1;
+  DepthImageView sensor;
+  sensor.camera = {100, 100, 80, 60, 160, 120};
+  GraphContext context{oneCamera(), {}, settings, {}, {}};
+  context.options.depth_sensor = &sensor;
+  MappingNode node(context);
+  const std::vector<std::uint8_t> pixels(160 * 120, 100);
+  KeyframeImages images;
+  images.image[0] = {pixels.data(), 160, 120, 160};
+  for (const bool seen : {true, false}) {
+    node.images.tell(seen ? &images : nullptr);
+    MapMessage* message = node.frames.begin();
+    REQUIRE(message != nullptr);
+    *message = {};
+    node.frames.commit();
+    REQUIRE(node.turn());
+  }
+  std::map<std::string, std::uint64_t> losses;
+  node.addLosses(losses);
+  CHECK(losses["frames_unmapped"] == 2);
 }
 
 }  // namespace
