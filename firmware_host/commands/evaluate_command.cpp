@@ -113,6 +113,10 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
   return evaluateMeshes(request, readEstimate(subject.files.front()), truth.poses, accuracy_options);
 }
 
+std::string titleOf(const EvaluateOptions& options, const std::string& file) {
+  return options.from > 0 ? fmt::format("{}, from {:g} s", file, options.from) : file;
+}
+
 // Compares map.tum with odometry.tum at common stamps, and reports revisits and loops.
 void compareMap(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
                 const AccuracyOptions& accuracy_options, const EvaluationGroup& settings, Json& json) {
@@ -121,7 +125,7 @@ void compareMap(const EvaluateOptions& options, const Subject& subject, const Tr
   const Trajectory odometry = readEstimate(run / "odometry.tum");
   const CommonStamps beside =
       compareAtCommonStamps(odometry, readEstimate(run / "map.tum"), truth.poses, accuracy_options);
-  const Revisits revisits = revisitsOf(odometry, truth.poses);
+  const Revisits revisits = revisitsOf(odometry, truth.poses, accuracy_options.association);
   json["map_beside_odometry"] = toJson(beside);
   json["revisits"] = toJson(revisits);
   std::string loops;
@@ -132,7 +136,7 @@ void compareMap(const EvaluateOptions& options, const Subject& subject, const Tr
   }
   if (options.json) return;
   fmt::print("{}, at the same stamps\n{}", subject.files.back(), toText(beside));
-  fmt::print("revisits\n{}{}", toText(revisits), loops);
+  fmt::print("{}\n{}{}", titleOf(options, "revisits"), toText(revisits), loops);
 }
 
 int evaluateHil(const EvaluateOptions& options) {
@@ -154,10 +158,6 @@ int evaluateHil(const EvaluateOptions& options) {
 void setSection(const EvaluateOptions& options, Stamp zero, AccuracyOptions& accuracy) {
   if (options.from > 0) accuracy.association.from = zero + Duration::fromSeconds(options.from);
   if (options.until >= 0) accuracy.association.until = zero + Duration::fromSeconds(options.until);
-}
-
-std::string titleOf(const EvaluateOptions& options, const std::string& file) {
-  return options.from > 0 ? fmt::format("{}, from {:g} s", file, options.from) : file;
 }
 
 int evaluatePositions(const EvaluateOptions& options, const Settings& settings, const Subject& subject) {
@@ -234,10 +234,9 @@ int evaluate(const EvaluateOptions& options) {
   }
   if (compared) compareMap(options, subject, truth, accuracy_options, settings.evaluation, json);
   if (!subject.states.empty()) {
-    const Consistency found =
-        consistencyOf(subject.states, truth.poses, accuracy_options.association.max_gap);
+    const Consistency found = consistencyOf(subject.states, truth.poses, accuracy_options.association);
     json["consistency"] = toJson(found);
-    if (!options.json) fmt::print("{}\n{}", subject.states, toText(found));
+    if (!options.json) fmt::print("{}\n{}", titleOf(options, subject.states), toText(found));
   }
   if (options.mesh && compared) {
     const MeshAccuracy found = meshAccuracy(options, subject, truth, accuracy_options);

@@ -1,10 +1,13 @@
-// What `swiftlet evaluate` says of rows that it leaves out.
+// What `swiftlet evaluate` leaves out: bad rows, which it names, and what lies outside --from and --until.
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "drivers/recorded/trajectory_file.hpp"
+#include "firmware_host/outputs/run_folder/states_csv.hpp"
 #include "tests/firmware_host/said.hpp"
 
 namespace swiftlet {
@@ -12,11 +15,13 @@ namespace {
 
 using Catch::Matchers::Contains;
 
-std::string row(int i) {
-  return formatTum({1'000'000'000 + i * 10'000'000LL},
-                   SE3(Eigen::Quaterniond::Identity(), {std::sin(0.1 * i), std::cos(0.2 * i), 0.01 * i})) +
-         "\n";
+Stamp stampOf(int i) { return {1'000'000'000 + i * 10'000'000LL}; }
+
+SE3 poseOf(int i) {
+  return SE3(Eigen::Quaterniond::Identity(), {std::sin(0.1 * i), std::cos(0.2 * i), 0.01 * i});
 }
+
+std::string row(int i) { return formatTum(stampOf(i), poseOf(i)) + "\n"; }
 
 /// 100 rows, of which `bad` takes the place of row 50.
 void writePoses(const std::string& file, const std::string& bad) {
@@ -48,6 +53,32 @@ TEST_CASE("evaluate names the rows that it leaves out, of the estimate and of th
              Contains("1 rows out of order, sorted by stamp; the first has 1100000000 ns") &&
                  Contains("1 rows are left out"));
   CHECK_THAT(test::say({"evaluate", whole, "--truth", whole}).text, !Contains("warning"));
+}
+
+TEST_CASE("NEES and revisits are those of the section alone") {
+  const ScratchFolder folder("evaluate_section");
+  const std::string truth = folder.file("truth.tum");
+  const std::string run = folder.file("run");
+  std::filesystem::create_directory(run);
+  for (const std::string& file : {truth, run + "/odometry.tum", run + "/map.tum"}) writePoses(file, row(50));
+  std::ofstream states(run + "/states.csv");
+  states << statesHeader() << '\n';
+  for (int i = 0; i < 100; i += 10) {
+    KeyframeState keyframe;
+    keyframe.state.stamp = stampOf(i);
+    keyframe.state.T_world_body = poseOf(i);
+    keyframe.state.covariance.setIdentity();
+    states << statesRow(keyframe) << '\n';
+  }
+  states.close();
+  const auto [option, value, keyframes, places] = GENERATE(table<std::string, std::string, int, int>(
+      {{"--from", "0", 10, 2}, {"--from", "0.5", 5, 1}, {"--until", "0.2", 3, 1}}));
+  INFO(option << " " << value);
+  const test::Said said = test::say({"evaluate", run, "--truth", truth, "--json", option, value});
+  REQUIRE(said.code == kExitDone);
+  const auto json = nlohmann::json::parse(said.text);
+  CHECK(json["consistency"]["states"] == keyframes - 1);  // the first one fixes the gauge
+  CHECK(json["revisits"]["samples"] == places);
 }
 
 TEST_CASE("a log's truth that lacks rows is reported by replay and by evaluate") {

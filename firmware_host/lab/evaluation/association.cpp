@@ -23,8 +23,7 @@ Association associate(const Trajectory& estimate, const Trajectory& truth,
   Association result;
   for (std::size_t i = 0; i < estimate.size(); ++i) {
     const TrajectoryPoint& point = estimate[i];
-    if (options.from && point.stamp < *options.from) continue;
-    if (options.until && point.stamp > *options.until) continue;
+    if (!options.inSection(point.stamp)) continue;
     ++result.estimates;
     const std::optional<SE3> truth_pose = interpolate(truth, point.stamp, options.max_gap);
     if (truth_pose) {

@@ -17,6 +17,10 @@ struct AssociationOptions {
   Duration max_gap = Duration::fromMilliseconds(20);
   std::optional<Stamp> from;   ///< earlier estimates are omitted
   std::optional<Stamp> until;  ///< later estimates are omitted
+
+  [[nodiscard]] bool inSection(Stamp stamp) const {
+    return (!from || stamp >= *from) && (!until || stamp <= *until);
+  }
 };
 
 struct PosePair {

@@ -89,10 +89,12 @@ void warnOfRows(const std::string& file, const LogCounters& counters, LogWarning
   if (rows > 0) warnings.add(fmt::format("{}: {} rows are left out of the comparison", file, rows));
 }
 
-Consistency consistencyOf(const std::string& states_file, const Trajectory& truth, Duration max_gap) {
+Consistency consistencyOf(const std::string& states_file, const Trajectory& truth,
+                          const AssociationOptions& options) {
   std::vector<ConsistencySample> samples;
   for (const StoredState& state : readStates(states_file)) {
-    const std::optional<SE3> pose = interpolate(truth, state.stamp, max_gap);
+    if (!options.inSection(state.stamp)) continue;
+    const std::optional<SE3> pose = interpolate(truth, state.stamp, options.max_gap);
     if (pose) samples.push_back({state.T_world_body, *pose, state.covariance});
   }
   return consistency(samples);
@@ -104,10 +106,11 @@ LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth,
                       accuracyOptions(settings, AlignKind::kSe3).association.max_gap);
 }
 
-Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth) {
+Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth, const AssociationOptions& section) {
   Trajectory flown;
   for (const TrajectoryPoint& point : truth) {
-    if (point.stamp >= estimate.front().stamp && point.stamp <= estimate.back().stamp) flown.push_back(point);
+    if (point.stamp < estimate.front().stamp || point.stamp > estimate.back().stamp) continue;
+    if (section.inSection(point.stamp)) flown.push_back(point);
   }
   return countRevisits(flown);
 }
@@ -128,8 +131,8 @@ Json runAccuracyJson(const std::string& folder, const Trajectory& truth, const s
   }
   if (!states.empty()) {
     json["states"] = sectionsJson(states, truth, first_image, settings);
-    json["consistency"] = toJson(consistencyOf(
-        path / "states.csv", truth, accuracyOptions(settings, AlignKind::kSe3).association.max_gap));
+    json["consistency"] = toJson(
+        consistencyOf(path / "states.csv", truth, accuracyOptions(settings, AlignKind::kSe3).association));
   }
   if (std::filesystem::exists(path / "map.tum")) {
     const Trajectory map = readEstimate(path / "map.tum");

@@ -41,8 +41,10 @@ nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajecto
 /// Accuracy of the loops in a loops.csv.
 LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth, const EvaluationGroup& settings);
 
-/// Revisits over the part of the truth that `estimate` (not empty) covers.
-Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth);
+/// Revisits over the part of the truth that `estimate` (not empty) covers, within the section. Places visited
+/// before the section do not count.
+Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth,
+                    const AssociationOptions& section = {});
 
 /// A trajectory file of any kind that readTrajectory() accepts; InputError if it has no pose. Omitted rows
 /// are reported in `warnings`.
@@ -52,7 +54,8 @@ Trajectory readEstimate(const std::string& path);
 /// Warns how many rows of `file` were omitted; the other warnings name the first of each kind.
 void warnOfRows(const std::string& file, const LogCounters& counters, LogWarnings& warnings);
 
-/// NEES of a run's keyframes. Keyframes without truth are omitted.
-Consistency consistencyOf(const std::string& states_file, const Trajectory& truth, Duration max_gap);
+/// NEES of a run's keyframes. Keyframes without truth and outside the section are omitted.
+Consistency consistencyOf(const std::string& states_file, const Trajectory& truth,
+                          const AssociationOptions& options);
 
 }  // namespace swiftlet
