@@ -149,9 +149,9 @@ std::vector<Setting> estimationSettings() {
        "Use the second camera. If false, only camera 0 is used and the scale comes from the IMU.",
        onOff(kOdometry, &O::use_stereo)},
       {"smoother.horizon", "s",
-       "Length of the smoother's window: older states are marginalized. full: the default length in flight, "
-       "and all keyframes are kept and smoothed together after the run (map.tum), by `replay` at its end, "
-       "for a flight by `swiftlet smooth` or flights.smooth.",
+       "Longest time span of the smoother's window; effort.keyframes limits it too. Older states are "
+       "marginalized. full: 30 s, and all keyframes are kept and smoothed together after the run (map.tum): "
+       "by `replay` at its end, after a flight by `swiftlet smooth` or flights.smooth.",
        RealOrWordSetting{{member(kOdometry, &O::horizon), 0.5, 60},
                          "full",
                          [](Settings& settings) -> bool& { return settings.full_smoothing; }}},
@@ -160,8 +160,8 @@ std::vector<Setting> estimationSettings() {
        "Maximum memory for smoothing all keyframes together. A run that needs more is not smoothed.",
        {IntegerSetting{[](Settings& settings) -> int& { return settings.full_memory_mib; }, 64, 1 << 20}}},
       {"smoother.pixel_sigma", "px",
-       "Standard deviation of a tracked image coordinate. Larger values trust images less than the IMU. The "
-       "actual noise is estimated in flight, between 0.55 and 15 times this value.",
+       "Standard deviation of a tracked image coordinate. Larger values give images less weight against the IMU. "
+       "The actual noise is estimated in flight, between 0.55 and 15 times this value.",
        real(kOdometry, &O::pixel_sigma, 0.05, 10)},
       {"smoother.estimate_time_offset", "",
        "Estimate in flight the time offset between camera and IMU, and the readout time of a rolling "
@@ -179,8 +179,7 @@ std::vector<Setting> estimationSettings() {
        real(kOdometry, &O::plane_point_sigma, 1e-4, 0.1)},
       {"health.max_speed", "m/s",
        "Highest speed of the vehicle. The health is not good while the estimated speed is above it. If it "
-       "stays "
-       "above, the estimate starts anew.",
+       "stays above, the odometry restarts with a new epoch.",
        real(kOdometry, &O::max_speed, 0.1, 1000)},
       {"health.max_acceleration", "m/s^2",
        "Highest acceleration of the vehicle, averaged over half a second. The health is not good while the "
