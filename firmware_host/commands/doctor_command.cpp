@@ -65,7 +65,8 @@ void addDoctorCommand(CLI::App& app, int& exit_code) {
       "  swiftlet doctor\n"
       "  swiftlet doctor --settings vehicle.yaml\n"
       "  swiftlet doctor data/euroc_mh01_20s\n"
-      "Exit code 0: the vehicle's devices work as configured, or no error was found in LOG.");
+      "Exit code 0: the vehicle's devices work as configured, or no error was found in LOG.\n"
+      "Exit code 1: something needs a remedy, or the settings name no device.");
   command->callback([options, &exit_code] { exit_code = doctor(*options); });
 }
 

@@ -77,7 +77,7 @@ Subject subjectOf(const EvaluateOptions& options) {
       if (std::filesystem::exists(path / name)) subject.files.push_back(path / name);
     }
     if (subject.files.empty()) {
-      throw InputError(options.run, 0, "", "has no odometry.tum", "Give a folder written by replay");
+      throw InputError(options.run, 0, "", "has no odometry.tum", "Give a folder written by replay or fly");
     }
     if (std::filesystem::exists(path / "states.csv")) subject.states = path / "states.csv";
     const Json summary = readSummary(path / "summary.json");

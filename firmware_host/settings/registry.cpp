@@ -160,8 +160,8 @@ std::vector<Setting> estimationSettings() {
        "Maximum memory for smoothing all keyframes together. A run that needs more is not smoothed.",
        {IntegerSetting{[](Settings& settings) -> int& { return settings.full_memory_mib; }, 64, 1 << 20}}},
       {"smoother.pixel_sigma", "px",
-       "Standard deviation of a tracked image coordinate. Larger values give images less weight against the IMU. "
-       "The actual noise is estimated in flight, between 0.55 and 15 times this value.",
+       "Standard deviation of a tracked image coordinate. Larger values give images less weight against the "
+       "IMU. The actual noise is estimated in flight, between 0.55 and 15 times this value.",
        real(kOdometry, &O::pixel_sigma, 0.05, 10)},
       {"smoother.estimate_time_offset", "",
        "Estimate in flight the time offset between camera and IMU, and the readout time of a rolling "
