@@ -281,7 +281,7 @@ std::vector<Setting> estimationSettings() {
        "each pair of labels; empty: map.label_certainty applies to all labels.",
        TextSetting{member(&Settings::map, &MapGroup::confusion), "a file name, or empty"}},
       {"calibration.accept_unusual_rig", "",
-       "Accept a rig whose geometry suggests that a transform was inverted.",
+       "Accept a rig whose geometry suggests that a transform was inverted, and a baseline above 1 m.",
        onOff(&Settings::calibration, &CalibrationGroup::accept_unusual_rig)},
       {"evaluation.max_gap_ms", "ms",
        "Maximum time between two truth poses between which the truth is interpolated. Larger values accept "
