@@ -150,10 +150,9 @@ DeviceFault CameraDevice::setRate() {
   const double lowest = (1 - kRateTolerance) * settings_.rate;
   double rate = settings_.rate;
   if (settings_.triggered && rate > 0) {
-    // Of an unknown rate, a driver sets the nearest, which may be too slow for the trigger.
-    rate = std::max(rate,
-                    slowestOffered(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, lowest)
-                        .value_or(rate));
+    // Asked for a rate between two modes, a driver may choose the one that is slower than the trigger.
+    rate = slowestOffered(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, lowest)
+               .value_or(rate);
   }
   if (rate > 0) {
     capture.timeperframe = {kRateNumerator, static_cast<std::uint32_t>(std::lround(rate * kRateNumerator))};
@@ -162,8 +161,8 @@ DeviceFault CameraDevice::setRate() {
   }
   if (capture.timeperframe.numerator == 0) return {};
   facts_.rate = static_cast<double>(capture.timeperframe.denominator) / capture.timeperframe.numerator;
-  const bool differs = std::abs(facts_.rate - settings_.rate) > kRateTolerance * settings_.rate;
-  if (settings_.rate > 0 && differs && !(settings_.triggered && facts_.rate >= lowest)) {
+  const bool fast = !settings_.triggered && facts_.rate > (1 + kRateTolerance) * settings_.rate;
+  if (settings_.rate > 0 && (facts_.rate < lowest || fast)) {
     std::array<char, kOfferBytes> rates = {};
     writeRates(node_, code(facts_.format.fourcc()), facts_.width, facts_.height, rates.data(), rates.size());
     return deviceFault(DeviceFaultKind::kChanged, 0, "requested %.4g frames per second, set %.4g; offers %s",
