@@ -57,13 +57,13 @@ Eigen::Vector3f nearestToOrigin(const Polygon& polygon, const Eigen::Vector3f& n
 
 constexpr int kSectors = static_cast<int>(kObstacleSectors);
 constexpr float kSectorWidth = 2 * std::numbers::pi_v<float> / static_cast<float>(kObstacleSectors);
-/// Azimuths at which a sector is asked for a face, to tell free from unknown: every 0.6 degrees, at 20 m the
-/// width of a vehicle.
+/// Azimuths at which a sector must have a face to be free: every 0.6 degrees, 0.2 m apart at 20 m, less than
+/// a vehicle's width.
 constexpr int kRaysPerSector = 8;
 using CrossedRays = std::bitset<kObstacleSectors * kRaysPerSector>;
 constexpr float kRayWidth = kSectorWidth / static_cast<float>(kRaysPerSector);
 
-/// Index of an azimuth's sector or ray, which come round again.
+/// Sectors and rays are numbered from the heading on, in both directions and beyond a full turn.
 std::size_t wrapped(int index, int count) {
   return static_cast<std::size_t>((index % count + count) % count);
 }
