@@ -71,18 +71,21 @@ TEST_CASE("The envelope keeps a window, and its slope through a restart", "[time
 }
 
 TEST_CASE("A slope beyond crystals' is taken from points on a line, not from a step", "[timesync]") {
-  for (const double rise : {3e-3, -3e-3}) {
-    Random random(1);
-    LowerEnvelope line;
-    LowerEnvelope step;
-    for (int i = 0; i < 100; ++i) {
-      const Stamp time = {i * LowerEnvelope::kBinWidth.ns};
-      const double jitter = random.uniform(0, 2e5);
-      line.add(time, static_cast<std::int64_t>(rise * static_cast<double>(time.ns) + jitter));
-      // As far as the line rises in 2 s, at any of the first 20 bins.
-      step.add(time, static_cast<std::int64_t>((i < 5 ? 0 : rise * 2e9) + jitter));
-      if (i > 20) CHECK(line.slope() == Approx(rise).epsilon(0.05));
-      CHECK(std::abs(step.slope()) < 151e-6);
+  for (const double slope : {3e-3, -3e-3}) {
+    for (int step_at = 1; step_at <= 20; ++step_at) {
+      Random random(1);
+      LowerEnvelope line;
+      LowerEnvelope step;
+      for (int i = 0; i < 100; ++i) {
+        const Stamp time = {i * LowerEnvelope::kBinWidth.ns};
+        const double jitter = random.uniform(0, 2e5);
+        line.add(time, static_cast<std::int64_t>(slope * static_cast<double>(time.ns) + jitter));
+        // By as much as the line rises in 2 s.
+        step.add(time, static_cast<std::int64_t>((i < step_at ? 0 : slope * 2e9) + jitter));
+        if (i > 20) CHECK(line.slope() == Approx(slope).epsilon(0.05));
+        INFO("step at " << step_at << ", point " << i);
+        CHECK(std::abs(step.slope()) < 151e-6);
+      }
     }
   }
 }
