@@ -78,14 +78,10 @@ FullSmoother::FullSmoother(const Rig& rig, const ImuNoise& noise, const FullSmoo
 
 void FullSmoother::addImu(const ImuSample& sample) {
   if (monitor_.check(sample).learned) noise_ = monitor_.noise();
-  if (keyframes_.size() < settings_.max_keyframes) pending_imu_.push_back(sample);
+  pending_imu_.push_back(sample);
 }
 
-Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
-  if (keyframes_.size() >= settings_.max_keyframes) {
-    return {StatusCode::kCapacityReached,
-            "full smoothing is at its limit of keyframes; the rest is not used"};
-  }
+void FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
   Keyframe keyframe;
   keyframe.stamp = frame.stamp;
   keyframe.epoch = state.epoch;
@@ -106,7 +102,6 @@ Status FullSmoother::addKeyframe(const TrackedFrame& frame, const NavState& stat
   }
   worlds_.try_emplace(state.epoch, state.epoch);
   keyframes_.push_back(std::move(keyframe));
-  return okStatus();
 }
 
 void FullSmoother::setCalibration(const CalibrationEstimate& calibration) {

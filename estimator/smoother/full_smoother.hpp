@@ -15,12 +15,11 @@
 // number of loops.
 //
 // Frames: those of the odometry. Each epoch has its own world, held by its first keyframe; epochs joined by
-// loops share the world of the earliest. Off the flight path: allocates. Memory is linear in keyframes, up to
-// `max_keyframes`: about 40 kB each at 200 features and 200 Hz, and the sparse system while solving;
-// memoryNeeded() computes it in advance. A match takes 0.3 kB. A landmark seen in more than 120 keyframes is
-// continued as a new one, so that only loops connect keyframes farther apart. Keyframes beyond max_keyframes
-// are refused (kCapacityReached), and the rest of the run is not in the map. Source: Kaess et al., "Square
-// Root SAM", IJRR 2006; factors: docs/smoother.md.
+// loops share the world of the earliest. Off the flight path: allocates. Memory is linear in keyframes: about
+// 40 kB each at 200 features and 200 Hz, and the sparse system while solving; memoryNeeded() computes it in
+// advance. A match takes 0.3 kB. A landmark seen in more than 120 keyframes is continued as a new one, so
+// that only loops connect keyframes farther apart. Source: Kaess et al., "Square Root SAM", IJRR 2006;
+// factors: docs/smoother.md.
 
 #include <atomic>
 #include <cstdint>
@@ -51,9 +50,7 @@ namespace swiftlet {
 inline constexpr const char* kFullSmoothingStopped = "full smoothing was stopped";
 
 struct FullSmootherSettings {
-  double match_sigma = 1.2;          ///< px, of a loop's match, including pixel noise
-  std::size_t max_keyframes = 4000;  ///< 11 minutes at 6 a second
-  std::size_t max_revisits = 4000;
+  double match_sigma = 1.2;  ///< px, of a loop's match, including pixel noise
   int max_iterations = 12;
 };
 
@@ -78,12 +75,12 @@ class FullSmoother {
   void addImu(const ImuSample& sample);
 
   /// Adds a keyframe with its state from the odometry and the noise used for it, in order of time. A new
-  /// epoch starts a new, unconnected trajectory. kCapacityReached beyond max_keyframes.
-  Status addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
+  /// epoch starts a new, unconnected trajectory.
+  void addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise);
 
   /// Adds a verified loop between two keyframes added before. kInvalidInput if there is no keyframe at a
-  /// stamp, the old one is not older, or the pose or its information is not usable; kCapacityReached beyond
-  /// max_revisits. Matches without track and pixel are skipped.
+  /// stamp, the old one is not older, or the pose or its information is not usable. Matches without track and
+  /// pixel are skipped.
   Status addRevisit(const LoopRevisit& revisit);
 
   /// Replaces the initial poses, one per keyframe, by those of a pose graph, if the drift is large. Epochs

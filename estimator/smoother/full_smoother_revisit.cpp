@@ -37,9 +37,6 @@ bool FullSmoother::findKeyframe(Stamp stamp, std::size_t& k) const {
 }
 
 Status FullSmoother::addRevisit(const LoopRevisit& loop) {
-  if (revisits_.size() >= settings_.max_revisits) {
-    return {StatusCode::kCapacityReached, "full smoothing is at its limit of loops; the rest is not used"};
-  }
   Revisit revisit;
   if (!findKeyframe(loop.old_stamp, revisit.old_keyframe) ||
       !findKeyframe(loop.new_stamp, revisit.new_keyframe) || revisit.old_keyframe >= revisit.new_keyframe) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -14,29 +15,33 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kMebibyte = std::size_t{1} << 20U;
-
-void add(const Status& kept, FaultCounts& faults) {
-  if (!kept.ok()) faults.add(kept);
-}
+// While reading, the memory needed is computed every so many keyframes: it takes milliseconds.
+constexpr std::size_t kCheckedEvery = 1000;
 
 bool stopped(const FullSmoothingOptions& options) {
   return options.stop != nullptr && options.stop->load(std::memory_order_relaxed);
 }
 
 /// Adds all records to the smoother, the last calibration estimate at the end. Returns early when stopped.
+/// Once the memory limit is exceeded, keyframes are only counted.
 void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoother& smoother,
           FullSmoothing& result) {
   std::optional<CalibrationEstimate> calibration;
+  bool full = false;
   while (!stopped(options)) {
     switch (reader.next()) {
       case KeyframeReader::Next::kSample:
-        smoother.addImu(reader.sample());
+        if (!full) smoother.addImu(reader.sample());
         break;
       case KeyframeReader::Next::kKeyframe:
-        add(smoother.addKeyframe(reader.frame(), reader.state(), reader.noiseInUse()), result.faults);
+        ++result.keyframes;
+        if (full) break;
+        smoother.addKeyframe(reader.frame(), reader.state(), reader.noiseInUse());
+        full = smoother.size() % kCheckedEvery == 0 && smoother.memoryNeeded() > options.most_bytes;
         break;
       case KeyframeReader::Next::kRevisit:
-        add(smoother.addRevisit(reader.revisit()), result.faults);
+        if (full) break;
+        if (const Status kept = smoother.addRevisit(reader.revisit()); !kept.ok()) result.faults.add(kept);
         break;
       case KeyframeReader::Next::kCalibration:
         calibration = reader.calibration();
@@ -50,12 +55,14 @@ void fill(KeyframeReader& reader, const FullSmoothingOptions& options, FullSmoot
 }
 
 void solve(FullSmoother& smoother, const FullSmoothingOptions& options, FullSmoothing& result) {
-  const std::size_t bytes = smoother.memoryNeeded();
+  // In proportion, if only the first keyframes were kept.
+  const std::size_t bytes =
+      smoother.memoryNeeded() * result.keyframes / std::max<std::size_t>(smoother.size(), 1);
   if (bytes > options.most_bytes) {
     result.problem = fmt::format(
         "full smoothing of {} keyframes needs up to {} MiB, above smoother.full_memory_mib ({}). Raise it on "
         "a computer with enough memory: `swiftlet smooth RUN --set smoother.full_memory_mib={}`",
-        smoother.size(), bytes / kMebibyte + 1, options.most_bytes / kMebibyte, bytes / kMebibyte + 1);
+        result.keyframes, bytes / kMebibyte + 1, options.most_bytes / kMebibyte, bytes / kMebibyte + 1);
     return;
   }
   if (options.begins) options.begins(smoother.size(), bytes);

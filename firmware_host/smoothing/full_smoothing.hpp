@@ -32,8 +32,9 @@ struct FullSmoothingOptions {
 struct FullSmoothing {
   std::vector<MapPose> poses;  ///< of the keyframes; empty: see `problem`
   FullSmootherReport report;   ///< only if there are poses
+  std::size_t keyframes = 0;   ///< in the file
   Spent spent;
-  FaultCounts faults;   ///< refused keyframes and loops
+  FaultCounts faults;   ///< refused loops
   std::string cut;      ///< where the file was cut off, as text; empty: it was complete
   std::string problem;  ///< why there are no poses, with the remedy; empty: there are some
 };

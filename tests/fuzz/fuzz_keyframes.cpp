@@ -48,7 +48,7 @@ void read(const std::string& bytes) {
       } else if (next == KeyframeReader::Next::kKeyframe) {
         demand(reader.state().T_world_body.translation.allFinite());
         demand(reader.noiseInUse().pixel_sigma > 0 && reader.noiseInUse().imu.gyro > 0);
-        (void)smoother.addKeyframe(reader.frame(), reader.state(), reader.noiseInUse());
+        smoother.addKeyframe(reader.frame(), reader.state(), reader.noiseInUse());
       } else if (next == KeyframeReader::Next::kCalibration) {
         demand(reader.calibration().T_body_cam[0].translation.allFinite());
         smoother.setCalibration(reader.calibration());

@@ -87,7 +87,7 @@ TEST_CASE("loops come back from the file and tie the keyframes as they did in me
         state.T_world_body = x.T_world_body;
         state.v_world_body = x.v_world_body;
         const NoiseInUse noise{0.6, {1.5, k % 2 == 0 ? 1.0 : 2.0}};
-        REQUIRE(memory.addKeyframe(frame, state, noise).ok());
+        memory.addKeyframe(frame, state, noise);
         keeper.addKeyframe(frame, state, noise);
         keyframes.push_back(k);
       });
@@ -187,6 +187,36 @@ TEST_CASE("more memory than allowed is refused before it is taken, with the reme
   CHECK(refused.poses.empty());
   CHECK_THAT(refused.problem, Catch::Contains("MiB") && Catch::Contains("--set smoother.full_memory_mib="));
   CHECK_FALSE(runSmooth({.run = run}, Settings{}).poses.empty());
+}
+
+TEST_CASE("a long flight is refused whole, or smoothed whole") {
+  const ScratchFolder folder("smooth");
+  const test::TrackFlight flight(test::roomFlight(1, 1));
+  constexpr std::size_t kKeyframes = 4100;
+  LostFiles lost;
+  MapKeeper keeper(folder.path(), flight.rig(), flight.noise(), {}, lost);
+  TrackedFrame frame = flight.frames()[0];
+  frame.features.resize(8);
+  for (std::size_t k = 1; k <= kKeyframes; ++k) {
+    frame.stamp = Stamp{static_cast<std::int64_t>(k) * 150'000'000};
+    NavState state;
+    state.stamp = frame.stamp;
+    keeper.addKeyframe(frame, state, {});
+  }
+  keeper.finish();
+  const std::string kept = folder.file(kKeyframeFile);
+  FullSmoothingOptions options = smoothingOptions(Settings{}, false);
+  options.most_bytes = std::size_t{20} << 20U;
+  const FullSmoothing refused = smoothKeyframes(kept, options);
+  CHECK(refused.poses.empty());
+  CHECK_THAT(refused.problem, Catch::Contains("of 4100 keyframes"));
+  // Most of the file was not kept; the remedy is enough for all of it.
+  const std::string_view remedy = "full_memory_mib=";
+  const std::size_t at = refused.problem.find(remedy);
+  REQUIRE(at != std::string::npos);
+  const std::size_t mebibytes = std::stoul(refused.problem.substr(at + remedy.size()));
+  options.most_bytes = mebibytes << 20U;
+  CHECK(smoothKeyframes(kept, options).poses.size() == kKeyframes);
 }
 
 TEST_CASE("a replay removes neither the recording that it reads nor what is not its own") {

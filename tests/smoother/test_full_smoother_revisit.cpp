@@ -59,7 +59,7 @@ Prepared prepared(double duration, std::uint64_t seed, double cut = 1e9, const S
           state.T_world_body = T_second_first * state.T_world_body;
           state.v_world_body = T_second_first.rotation * state.v_world_body;
         }
-        REQUIRE(run.full[0].addKeyframe(frame, state, causal.smoother().newest().statistics.noise).ok());
+        run.full[0].addKeyframe(frame, state, causal.smoother().newest().statistics.noise);
         run.keyframes.push_back(k);
         run.causal.push_back(state);
         run.truth.push_back(flight.truth(k));
@@ -231,10 +231,8 @@ TEST_CASE("Loops with pixels in place of tracks, and loops that cannot be used",
   CHECK(by_pixels.report.matches_used > by_tracks.report.matches_used / 2);
   CHECK(by_pixels.error < 0.8 * without.error);
 
-  FullSmootherSettings small;
-  small.max_revisits = 0;
-  FullSmoother none(run.flight->rig(), run.flight->noise(), small);
-  CHECK(none.addRevisit(tracks[0]).code == StatusCode::kCapacityReached);
+  FullSmoother none(run.flight->rig(), run.flight->noise(), {});
+  CHECK(none.addRevisit(tracks[0]).code == StatusCode::kInvalidInput);
   FullSmoother full = run.full[0];
   LoopRevisit bad = tracks[0];
   std::swap(bad.old_stamp, bad.new_stamp);
