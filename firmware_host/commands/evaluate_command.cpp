@@ -18,6 +18,7 @@
 #include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/lab/evaluation/mesh_report.hpp"
 #include "firmware_host/lab/hil/hil_checks.hpp"
+#include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/console.hpp"
 
@@ -114,12 +115,15 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
 }
 
 std::string titleOf(const EvaluateOptions& options, const std::string& file) {
-  return options.from > 0 ? fmt::format("{}, from {:g} s", file, options.from) : file;
+  std::string title = file;
+  if (options.from > 0) title += fmt::format(", from {:g} s", options.from);
+  if (options.until >= 0) title += fmt::format(", until {:g} s", options.until);
+  return title;
 }
 
 // Compares map.tum with odometry.tum at common stamps, and reports revisits and loops.
 void compareMap(const EvaluateOptions& options, const Subject& subject, const Truth& truth,
-                const AccuracyOptions& accuracy_options, const EvaluationGroup& settings, Json& json) {
+                const AccuracyOptions& accuracy_options, Json& json) {
   const std::filesystem::path run(options.run);
   if (!std::filesystem::exists(run / "map.tum") || !std::filesystem::exists(run / "odometry.tum")) return;
   const Trajectory odometry = readEstimate(run / "odometry.tum");
@@ -130,9 +134,10 @@ void compareMap(const EvaluateOptions& options, const Subject& subject, const Tr
   json["revisits"] = toJson(revisits);
   std::string loops;
   if (std::filesystem::exists(run / "loops.csv")) {
-    const LoopAccuracy accuracy = loopsOf(run / "loops.csv", truth.poses, settings);
+    const LoopAccuracy accuracy =
+        loopAccuracy(readLoops(run / "loops.csv"), truth.poses, accuracy_options.association);
     json["loops"] = toJson(accuracy);
-    loops = "loops\n" + toText(accuracy);
+    loops = titleOf(options, "loops") + "\n" + toText(accuracy);
   }
   if (options.json) return;
   fmt::print("{}, at the same stamps\n{}", subject.files.back(), toText(beside));
@@ -232,7 +237,7 @@ int evaluate(const EvaluateOptions& options) {
     json[std::filesystem::path(file).filename().string()] = toJson(accuracy);
     if (!options.json) fmt::print("{}", toText(titleOf(options, file), accuracy));
   }
-  if (compared) compareMap(options, subject, truth, accuracy_options, settings.evaluation, json);
+  if (compared) compareMap(options, subject, truth, accuracy_options, json);
   if (!subject.states.empty()) {
     const Consistency found = consistencyOf(subject.states, truth.poses, accuracy_options.association);
     json["consistency"] = toJson(found);

@@ -391,7 +391,9 @@ TEST_CASE("loops are judged by the truth at both ends, and survive their file") 
     CHECK((read[i].T_old_new.translation - loops[i].T_old_new.translation).norm() < 1e-7);
     CHECK(read[i].T_old_new.rotation.angularDistance(loops[i].T_old_new.rotation) < 1e-7);
   }
-  const LoopAccuracy accuracy = loopAccuracy(read, truth, Duration::fromMilliseconds(200));
+  AssociationOptions options;
+  options.max_gap = Duration::fromMilliseconds(200);
+  const LoopAccuracy accuracy = loopAccuracy(read, truth, options);
   CHECK(accuracy.verified == 4);
   CHECK(accuracy.verified_right == 2);
   CHECK(accuracy.selected == 1);
@@ -399,6 +401,16 @@ TEST_CASE("loops are judged by the truth at both ends, and survive their file") 
   CHECK(accuracy.without_truth == 1);
   CHECK(accuracy.median_distance == Approx(0.05).margin(1e-6));
   CHECK(accuracy.median_degrees == Approx(0.573).margin(1e-3));
+  options.from = truth[81].stamp;
+  options.until = truth[82].stamp;
+  const LoopAccuracy section = loopAccuracy(read, truth, options);
+  CHECK(section.verified == 2);
+  CHECK(section.without_truth == 0);
+  options.from = truth[82].stamp;
+  const LoopAccuracy none_right = loopAccuracy(read, truth, options);
+  CHECK(none_right.verified == 1);
+  CHECK(toJson(none_right)["median_error_m"].is_null());
+  CHECK_THAT(toText(none_right), !Catch::Matchers::Contains("median"));
 }
 
 TEST_CASE("positions of another clock: the shift and the error that is left", "[evaluation]") {

@@ -93,21 +93,24 @@ std::string toText(const CommonStamps& map_beside_odometry) {
 }
 
 Json toJson(const LoopAccuracy& loops) {
+  const auto figure = [&](double value) { return loops.verified_right > 0 ? Json(value) : Json(nullptr); };
   return {{"verified", loops.verified},
           {"verified_right", loops.verified_right},
           {"selected", loops.selected},
           {"selected_right", loops.selected_right},
           {"without_truth", loops.without_truth},
-          {"median_error_m", loops.median_distance},
-          {"median_error_deg", loops.median_degrees}};
+          {"median_error_m", figure(loops.median_distance)},
+          {"median_error_deg", figure(loops.median_degrees)}};
 }
 
 std::string toText(const LoopAccuracy& loops) {
-  return fmt::format(
-      "  {} of {} verified are correct (within {:g} m and {:g} deg), {} of {} selected; median error {:.4f} "
-      "m, {:.3f} deg\n",
-      loops.verified_right, loops.verified, kFalseLoopDistance, kFalseLoopDegrees, loops.selected_right,
-      loops.selected, loops.median_distance, loops.median_degrees);
+  std::string text = fmt::format(
+      "  {} of {} verified are correct (within {:g} m and {:g} deg), {} of {} selected", loops.verified_right,
+      loops.verified, kFalseLoopDistance, kFalseLoopDegrees, loops.selected_right, loops.selected);
+  if (loops.verified_right > 0) {
+    text += fmt::format("; median error {:.4f} m, {:.3f} deg", loops.median_distance, loops.median_degrees);
+  }
+  return text + "\n";
 }
 
 std::string toText(const Revisits& revisits) {

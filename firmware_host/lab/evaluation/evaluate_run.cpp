@@ -100,12 +100,6 @@ Consistency consistencyOf(const std::string& states_file, const Trajectory& trut
   return consistency(samples);
 }
 
-LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth,
-                     const EvaluationGroup& settings) {
-  return loopAccuracy(readLoops(loops_file), truth,
-                      accuracyOptions(settings, AlignKind::kSe3).association.max_gap);
-}
-
 Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth, const AssociationOptions& section) {
   Trajectory flown;
   for (const TrajectoryPoint& point : truth) {
@@ -143,7 +137,8 @@ Json runAccuracyJson(const std::string& folder, const Trajectory& truth, const s
     json["map_beside_odometry"]["from_3s"] = toJson(compareAtCommonStamps(odometry, map, truth, options));
   }
   if (std::filesystem::exists(path / "loops.csv")) {
-    json["loops"] = toJson(loopsOf(path / "loops.csv", truth, settings));
+    json["loops"] = toJson(loopAccuracy(readLoops(path / "loops.csv"), truth,
+                                        accuracyOptions(settings, AlignKind::kSe3).association));
   }
   json["revisits"] = toJson(revisitsOf(odometry, truth));
   return json;

@@ -38,9 +38,6 @@ nlohmann::ordered_json runAccuracyJson(const std::string& folder, const Trajecto
                                        const std::string& truth_name, Stamp first_image,
                                        const EvaluationGroup& settings);
 
-/// Accuracy of the loops in a loops.csv.
-LoopAccuracy loopsOf(const std::string& loops_file, const Trajectory& truth, const EvaluationGroup& settings);
-
 /// Revisits over the part of the truth that `estimate` (not empty) covers, within the section. Places visited
 /// before the section do not count.
 Revisits revisitsOf(const Trajectory& estimate, const Trajectory& truth,

@@ -18,13 +18,15 @@ double medianOf(std::vector<double>& values) {
 
 }  // namespace
 
-LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth, Duration max_gap) {
+LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth,
+                          const AssociationOptions& options) {
   LoopAccuracy out;
   std::vector<double> distances;
   std::vector<double> turns;
   for (const MapLoop& loop : loops) {
-    const std::optional<SE3> old_pose = interpolate(truth, loop.old_stamp, max_gap);
-    const std::optional<SE3> new_pose = interpolate(truth, loop.new_stamp, max_gap);
+    if (!options.inSection(loop.new_stamp)) continue;
+    const std::optional<SE3> old_pose = interpolate(truth, loop.old_stamp, options.max_gap);
+    const std::optional<SE3> new_pose = interpolate(truth, loop.new_stamp, options.max_gap);
     if (!old_pose || !new_pose) {
       ++out.without_truth;
       continue;

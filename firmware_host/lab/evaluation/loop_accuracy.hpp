@@ -24,6 +24,8 @@ struct LoopAccuracy {
   double median_degrees = 0;   ///< rotation, of the correct loops
 };
 
-LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth, Duration max_gap);
+/// Loops whose newer end is outside the section are omitted.
+LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth,
+                          const AssociationOptions& options);
 
 }  // namespace swiftlet
