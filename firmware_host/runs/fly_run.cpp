@@ -14,7 +14,6 @@
 #include "firmware_host/runs/fly_threaded.hpp"
 #include "firmware_host/runs/run_output.hpp"
 #include "firmware_host/runs/vehicle_calibration.hpp"
-#include "firmware_host/settings/confusion_file.hpp"
 #include "firmware_host/settings/map_check.hpp"
 
 namespace swiftlet {
@@ -62,7 +61,7 @@ class FlightRun {
       return result_;
     }
     memory_.note("devices");
-    LoopInputs inputs = readLoopInputs(settings_, request_.kept_maps.keep);
+    RunInputs inputs = readRunInputs(settings_, request_.kept_maps.keep);
     result_.out = claimFolder(request_, settings_, claim_, lost_);
     output_.emplace(result_.out, settings_, calibration_,
                     RunOutput::Wanted{request_.imu_rate, false, request_.kept_maps.keep, true},
@@ -82,7 +81,6 @@ class FlightRun {
     }
     GraphOptions wanted = output_->graphOptions();
     wanted.recorder = recorder_.get();
-    wanted.confusion = confusionOf(settings_);
     wanted.sample_patience = input_.samplePatience();
     wanted.remarks = [this](RunObserver& observer) { return remark(observer); };
     // The schedule calls this ten times a second.

@@ -22,7 +22,6 @@
 #include "firmware_host/runs/run_output.hpp"
 #include "firmware_host/schedule/lockstep.hpp"
 #include "firmware_host/schedule/recorded.hpp"
-#include "firmware_host/settings/confusion_file.hpp"
 #include "firmware_host/settings/map_check.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
@@ -121,7 +120,6 @@ class ReplayRun {
   void openScenes() {
     if (!settings_.map.enabled || request_.reproduce) return;
     checkMapSettings(settings_.map_stage);
-    confusion_ = confusionOf(settings_);
     if (!facts_.tracks.empty()) {
       throw InputError(request_.log, 0, "", "a log of feature tracks has no images to map", "Omit --map");
     }
@@ -154,7 +152,7 @@ class ReplayRun {
   void begin() {
     facts_.mono = !settings_.odometry.use_stereo || source_->rig().camera_count < 2;
     refuseOwnLog();
-    LoopInputs inputs = readLoopInputs(settings_, request_.kept_maps.keep);
+    RunInputs inputs = readRunInputs(settings_, request_.kept_maps.keep);
     claim_.emplace(request_.out, RunKind::kReplay, request_.replace);
     output_.emplace(request_.out, settings_, source_->calibration(),
                     RunOutput::Wanted{request_.imu_rate, request_.mesh_sequence, request_.kept_maps.keep},
@@ -169,7 +167,6 @@ class ReplayRun {
     GraphOptions wanted = output_->graphOptions();
     wanted.track_effort = &efforts.track;
     wanted.smooth_effort = &efforts.smooth;
-    wanted.confusion = confusionOf(settings_);
     const auto& depth_sensor = recording_->header().depth_sensor;
     if (depth_sensor) wanted.depth_sensor = &*depth_sensor;
     const auto graph =
@@ -192,7 +189,6 @@ class ReplayRun {
     wanted.recorder = recorder_.get();
     wanted.drag = hooks_.drag;
     if (scenes_) wanted.depth_sensor = scenes_->depthSensor();
-    wanted.confusion = confusion_;
     LogFeed& feed = feed_.emplace(*source_, request_.section(), tracks_.get(), scenes_ ? &*scenes_ : nullptr);
     if (request_.real_time) {
       FlightRequest flight;
@@ -292,7 +288,6 @@ class ReplayRun {
   std::unique_ptr<TrackReader> tracks_;
   std::optional<SceneReader> scenes_;
   std::size_t scene_warnings_ = 0;
-  std::optional<ConfusionModel> confusion_;
   std::size_t warned_ = 0;
   std::vector<std::string> findings_;
   std::size_t steps_ = 0;

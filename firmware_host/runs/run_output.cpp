@@ -12,12 +12,13 @@
 #include "firmware_host/outputs/run_folder/loops_csv.hpp"
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/runs/smooth_run.hpp"
+#include "firmware_host/settings/confusion_file.hpp"
 #include "firmware_host/settings/read_settings.hpp"
 
 namespace swiftlet {
 
-LoopInputs readLoopInputs(const Settings& settings, const std::string& keep_map) {
-  LoopInputs inputs;
+RunInputs readRunInputs(const Settings& settings, const std::string& keep_map) {
+  RunInputs inputs;
   const std::string& vocabulary = settings.loop.vocabulary;
   if (settings.loop.enabled && !vocabulary.empty()) {
     inputs.vocabulary = std::make_unique<const Vocabulary>(readVocabulary(vocabulary));
@@ -25,6 +26,7 @@ LoopInputs readLoopInputs(const Settings& settings, const std::string& keep_map)
   if (!settings.loop.in_map.empty()) {
     inputs.kept_map = std::make_unique<const KeptGraph>(readKeptFolder(settings.loop.in_map));
   }
+  if (settings.map.enabled) inputs.confusion = confusionOf(settings);
   if (!keep_map.empty()) refuseExisting(keep_map);
   return inputs;
 }
@@ -44,7 +46,7 @@ void RunOutput::attempt(const Write& write) const {
 }
 
 RunOutput::RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration,
-                     Wanted wanted, LoopInputs inputs, LostFiles& lost)
+                     Wanted wanted, RunInputs inputs, LostFiles& lost)
     : out_(out),
       settings_(settings),
       calibration_(calibration),
@@ -72,6 +74,7 @@ GraphOptions RunOutput::graphOptions() {
   options.meshes = wanted_.mesh_sequence;
   options.vocabulary = inputs_.vocabulary.get();
   options.kept_map = inputs_.kept_map.get();
+  options.confusion = inputs_.confusion;
   options.storage = &recorder_.storage();
   if (const std::string volume = keptVolumeOf(settings_.loop.in_map);
       inputs_.kept_map && std::filesystem::exists(volume)) {

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "drivers/calibration/calibration.hpp"
@@ -17,18 +18,20 @@
 #include "firmware_host/outputs/run_folder/run_recorder.hpp"
 #include "firmware_host/outputs/run_folder/summary.hpp"
 #include "firmware_host/realtime/memory_use.hpp"
+#include "mapping/volume/confusion_model.hpp"
 
 namespace swiftlet {
 
-/// What loop closure reads before a run.
-struct LoopInputs {
+/// Files read before a run.
+struct RunInputs {
   std::unique_ptr<const Vocabulary> vocabulary;  ///< null: the shipped one
   std::unique_ptr<const KeptGraph> kept_map;     ///< map in which the run is located; null: none
+  std::optional<ConfusionModel> confusion;       ///< map.confusion; empty: none, or no map
 };
 
 /// Call before the run's folder is claimed: a claim deletes the earlier run in it. InputError if a file is
 /// refused, or if the folder `keep_map` exists (empty: no map is kept).
-[[nodiscard]] LoopInputs readLoopInputs(const Settings& settings, const std::string& keep_map);
+[[nodiscard]] RunInputs readRunInputs(const Settings& settings, const std::string& keep_map);
 
 class RunOutput {
  public:
@@ -42,7 +45,7 @@ class RunOutput {
   /// `out` exists and is claimed by the run (run_claim.hpp); empty: there is no folder, and nothing is
   /// written. Settings, calibration and `lost` outlive this object.
   RunOutput(const std::string& out, const Settings& settings, const Calibration& calibration, Wanted wanted,
-            LoopInputs inputs, LostFiles& lost);
+            RunInputs inputs, LostFiles& lost);
 
   [[nodiscard]] RunObserver& observer() { return observer_; }
   /// Graph options that depend on this folder.
@@ -77,7 +80,7 @@ class RunOutput {
   Wanted wanted_;
   LostFiles& lost_;
   bool keeps_keyframes_ = false;
-  LoopInputs inputs_;
+  RunInputs inputs_;
   RunRecorder recorder_;
   RunObserver observer_;
 };
