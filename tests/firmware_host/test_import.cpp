@@ -200,6 +200,38 @@ TEST_CASE("a phone's folder becomes a log with the stamps of its lines", "[impor
   CHECK(fs::exists(request.out + "/mav0/imu0/data.csv"));
 }
 
+TEST_CASE("a calibration for another size of the second camera's video is refused", "[import]") {
+  const std::optional<std::string> video = karmaFile("karma.mp4");
+  if (!video) return;
+  const ScratchFolder scratch("import_sizes");
+  fs::create_directories(scratch.file("phone"));
+  for (const char* name : {"/data.mp4", "/data2.mp4"}) {
+    fs::create_symlink(fs::absolute(*video), scratch.file("phone") + name);
+  }
+  std::ofstream lines(scratch.file("phone") + "/data.jsonl");
+  for (int i = 0; i < 3; ++i) {
+    lines << R"({"sensor":{"type":"gyroscope","values":[0.1,0.2,0.3]},"time":)" << i << "}\n"
+          << R"({"sensor":{"type":"accelerometer","values":[0,0,9.8]},"time":)" << i << "}\n"
+          << R"({"frames":[{"cameraInd":0},{"cameraInd":1}],"time":)" << i << "}\n";
+  }
+  lines.close();
+  ImportRequest request;
+  request.video = scratch.file("phone");
+  request.calibration = karmaCalibration(scratch);
+  std::ofstream(request.calibration + "/camchain.yaml", std::ios::app)
+      << "cam1:\n  camera_model: pinhole\n  distortion_model: none\n  distortion_coeffs: []\n"
+         "  intrinsics: [557, 557, 320, 240]\n  resolution: [640, 480]\n  timeshift_cam_imu: -0.025\n"
+         "  T_cam_imu:\n  - [0, -1, 0, 0.1]\n  - [-1, 0, 0, 0]\n  - [0, 0, -1, 0]\n  - [0, 0, 0, 1]\n";
+  request.out = scratch.file("log");
+  try {
+    (void)importVideo(request);
+    FAIL("a calibration for another size was accepted");
+  } catch (const InputError& error) {
+    CHECK(std::string(error.what()).find("camera 1 has 640x480, but ") != std::string::npos);
+  }
+  CHECK(!fs::exists(request.out));
+}
+
 TEST_CASE("a phone's log without times of its images is refused", "[import]") {
   const ScratchFolder scratch("import_no_frames");
   fs::create_directories(scratch.file("phone"));

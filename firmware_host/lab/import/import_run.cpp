@@ -166,6 +166,18 @@ std::vector<Stamp> writeCamera(const ImportRequest& request, const Recording& re
   return stamps;
 }
 
+void checkSizes(const ImportRequest& request, const Rig& rig, const std::vector<std::string>& videos) {
+  for (std::size_t c = 0; c < std::min(videos.size(), rig.camera_count); ++c) {
+    const CameraModel& camera = rig.camera[c];
+    const VideoFile video(videos[c]);
+    if (camera.width() == video.width() && camera.height() == video.height()) continue;
+    throw InputError(request.calibration, 0, "resolution",
+                     fmt::format("camera {} has {}x{}, but {} has {}x{}", c, camera.width(), camera.height(),
+                                 videos[c], video.width(), video.height()),
+                     "Give the calibration for this video size");
+  }
+}
+
 void checkOverlap(const ImportRequest& request, const std::vector<ImuSample>& samples,
                   const std::vector<Stamp>& images) {
   if (samples.back().stamp >= images.front() && samples.front().stamp <= images.back()) return;
@@ -205,15 +217,7 @@ ImportResult importVideo(const ImportRequest& request) {
   const bool phone = fs::is_directory(request.video);
   const Recording recording = phone ? phoneRecording(request.video) : videoRecording(request, result);
   const VideoFile first(recording.videos.front());
-  if (calibration) {
-    const CameraModel& camera = calibration->rig.camera[0];
-    if (camera.width() != first.width() || camera.height() != first.height()) {
-      throw InputError(request.calibration, 0, "resolution",
-                       fmt::format("is {}x{}, the video has {}x{}", camera.width(), camera.height(),
-                                   first.width(), first.height()),
-                       "Give the calibration for this video size");
-    }
-  }
+  if (calibration) checkSizes(request, calibration->rig, recording.videos);
   LogFolder folder(request.out);
   result.cameras = recording.videos.size();
   std::vector<Stamp> images;

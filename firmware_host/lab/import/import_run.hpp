@@ -29,8 +29,8 @@ struct ImportResult {
   std::vector<std::string> warnings;
 };
 
-/// InputError: a file that cannot be read, clocks that do not overlap, or an existing log in `out`. Nothing
-/// is left in `out` then.
+/// InputError: a file that cannot be read, a calibration for another image size, clocks that do not overlap,
+/// or an existing log in `out`. Nothing is left in `out` then.
 ImportResult importVideo(const ImportRequest& request);
 
 }  // namespace swiftlet
