@@ -44,6 +44,7 @@ MapKeeper::MapKeeper(const std::string& folder, const Rig& rig, const ImuNoise& 
     : path_(folder + "/" + kKeyframeFile),
       calibration_estimated_(settings.estimate_time_offset || settings.estimate_extrinsics ||
                              settings.estimate_gyro),
+      rolls_(rig.rolls()),
       lost_(lost),
       monitor_(noise),
       buffer_(kBufferBytes),
@@ -133,7 +134,7 @@ void MapKeeper::addCalibration(const CalibrationEstimate& calibration) {
   to.i64(calibration.camera_to_imu_shift.ns);
   for (const SE3& T : calibration.T_body_cam) put(to, T);
   for (const double entry : calibration.gyro.matrix.reshaped<Eigen::RowMajor>()) to.f64(entry);
-  if (calibration.readout.ns != 0) to.i64(calibration.readout.ns);
+  if (rolls_) to.i64(calibration.readout.ns);
   writeRecord(Kind::kCalibration, to.written());
 }
 

@@ -62,6 +62,7 @@ class MapKeeper {
   };
   std::string path_;
   bool calibration_estimated_;
+  bool rolls_;  ///< the shutter; calibrations are written with their readout
   LostFiles& lost_;
   SampleMonitor monitor_;
   std::vector<char> buffer_;
