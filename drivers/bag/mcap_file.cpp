@@ -1,7 +1,6 @@
 #include "drivers/bag/mcap_file.hpp"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +18,7 @@ namespace swiftlet {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
+using mcap::crcOf;
 using mcap::Op;
 
 constexpr std::uint32_t kNoChunk = std::numeric_limits<std::uint32_t>::max();
@@ -32,10 +32,6 @@ std::string_view readText(LittleFieldReader& reader) { return textOf(reader.byte
 BagEncoding encodingOf(std::string_view message_encoding) {
   if (message_encoding == "cdr") return BagEncoding::kCdr;
   return message_encoding == "ros1" ? BagEncoding::kRos1 : BagEncoding::kOther;
-}
-
-std::uint32_t crcOf(std::uint32_t crc, Bytes bytes) {
-  return static_cast<std::uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
 }
 
 class McapFile final : public BagFile {

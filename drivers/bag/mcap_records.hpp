@@ -1,10 +1,13 @@
 #pragma once
-// Layout shared by the reader and the writer of MCAP files. All numbers are little-endian.
+// Layout and checksum shared by the reader and the writer of MCAP files. All numbers are little-endian.
 // Source: the MCAP specification, version 0 (github.com/foxglove/mcap, website/docs/spec).
+
+#include <zlib.h>
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace swiftlet::mcap {
 
@@ -27,5 +30,10 @@ enum class Op : std::uint8_t {
 inline constexpr std::size_t kRecordHead = 9;      ///< opcode, length of the content
 inline constexpr std::size_t kMessageHead = 22;    ///< channel, sequence, log time, publish time
 inline constexpr std::size_t kFooterContent = 20;  ///< start of the summary, of its offsets, checksum
+
+/// `crc` continued over `bytes`; begin with 0.
+inline std::uint32_t crcOf(std::uint32_t crc, std::span<const std::uint8_t> bytes) {
+  return static_cast<std::uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
+}
 
 }  // namespace swiftlet::mcap

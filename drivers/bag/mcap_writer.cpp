@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -21,14 +20,11 @@ namespace swiftlet {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
+using mcap::crcOf;
 using mcap::Op;
 
 constexpr std::size_t kChunkBytes = std::size_t{1}
                                     << 20U;  // as in rosbag2: holds some images, or seconds of IMU
-
-std::uint32_t crcOf(std::uint32_t crc, Bytes bytes) {
-  return static_cast<std::uint32_t>(::crc32_z(crc, bytes.data(), bytes.size()));
-}
 
 /// A buffer of consecutive records.
 class Records {
