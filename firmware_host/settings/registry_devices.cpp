@@ -104,7 +104,7 @@ std::vector<Setting> deviceSettings() {
       {"cameras.readout_ms", "ms",
        "Readout time from the first row to the last: of a rolling shutter, and of any camera whose driver "
        "stamps the end of the frame. 0: unknown.",
-       real(kCameras, &C::readout_ms, 0, 100)},
+       real(kCameras, &C::readout_ms, 0, 200)},
       {"trigger.chip", "",
        "GPIO chip that receives the cameras' trigger signal; imu: the IMU reports its edges; empty: the "
        "cameras' "
