@@ -1,46 +1,32 @@
 #include "firmware_host/outputs/map_files/map_files.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/outputs/map_files/ply_writer.hpp"
 
 namespace swiftlet {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-static_assert(std::endian::native == std::endian::little, "both formats are written as the memory has them");
+void append(std::string& to, const Eigen::Vector3f& p) {
+  for (const float x : p) appendBytes(to, x);
+}
 
-class Bytes {
- public:
-  template <typename T>
-  void add(const T& value) {
-    const auto at = bytes_.size();
-    bytes_.resize(at + sizeof(T));
-    std::memcpy(bytes_.data() + at, &value, sizeof(T));
-  }
-  void add(const Eigen::Vector3f& p) {
-    for (int i = 0; i < 3; ++i) add(p[i]);
-  }
-  void pad(std::size_t to, char with) { bytes_.resize((bytes_.size() + to - 1) / to * to, with); }
-  void reserve(std::size_t count) { bytes_.reserve(count); }
-  [[nodiscard]] std::size_t size() const { return bytes_.size(); }
-  [[nodiscard]] const std::vector<char>& get() const { return bytes_; }
+/// Fills up to the next multiple of `to`.
+void pad(std::string& bytes, std::size_t to, char with) {
+  bytes.resize((bytes.size() + to - 1) / to * to, with);
+}
 
- private:
-  std::vector<char> bytes_;
-};
-
-void writeAll(const std::string& path, const std::vector<char>& head, const std::vector<char>& body) {
+void writeAll(const std::string& path, const std::string& head, const std::string& body) {
   WholeFile file(path);
-  file.write({head.data(), head.size()});
-  file.write({body.data(), body.size()});
+  file.write(head);
+  file.write(body);
   file.commit();
 }
 
@@ -57,6 +43,30 @@ constexpr int kVertexBuffer = 34962;
 constexpr int kIndexBuffer = 34963;
 constexpr int kTriangles = 4;
 
+/// Writes the JSON and, unless it is empty, the binary chunk.
+void writeGlb(const std::string& path, const Json& json, const std::string& binary) {
+  std::string text = json.dump();
+  pad(text, kChunkAlignment, ' ');
+  constexpr std::size_t kFileHead = 12;
+  constexpr std::size_t kChunkHead = 8;
+  const std::size_t total =
+      kFileHead + kChunkHead + text.size() + (binary.empty() ? 0 : kChunkHead + binary.size());
+  if (total > std::numeric_limits<std::uint32_t>::max()) {
+    throw InputError(path, 0, "", "the map exceeds the 4 GiB of a .glb file", "Use map.ply");
+  }
+  std::string head;
+  for (const std::uint32_t word : {kGlbMagic, kGlbVersion, static_cast<std::uint32_t>(total),
+                                   static_cast<std::uint32_t>(text.size()), kJsonChunk}) {
+    appendBytes(head, word);
+  }
+  head += text;
+  if (!binary.empty()) {
+    appendBytes(head, static_cast<std::uint32_t>(binary.size()));
+    appendBytes(head, kBinaryChunk);
+  }
+  writeAll(path, head, binary);
+}
+
 /// Collects the binary chunk and the JSON that describes it.
 class GlbBuilder {
  public:
@@ -71,7 +81,7 @@ class GlbBuilder {
         {"bufferView", views_.size() - 1}, {"componentType", component}, {"count", count}, {"type", type}};
     if (normalized) accessor["normalized"] = true;
     accessors_.push_back(accessor);
-    binary_.pad(kChunkAlignment, 0);
+    pad(binary_, kChunkAlignment, 0);
     return static_cast<int>(accessors_.size()) - 1;
   }
   Json& last() { return accessors_.back(); }
@@ -91,26 +101,11 @@ class GlbBuilder {
                  {"accessors", accessors_},
                  {"bufferViews", views_},
                  {"buffers", {{{"byteLength", binary_.size()}}}}};
-    std::string text = json.dump();
-    text.resize((text.size() + kChunkAlignment - 1) / kChunkAlignment * kChunkAlignment, ' ');
-    constexpr std::size_t kHeaders = 12 + 8 + 8;
-    const std::size_t total = kHeaders + text.size() + binary_.size();
-    if (total > std::numeric_limits<std::uint32_t>::max()) {
-      throw InputError(path, 0, "", "the map exceeds the 4 GiB of a .glb file", "Use map.ply");
-    }
-    Bytes head;
-    for (const std::uint32_t word : {kGlbMagic, kGlbVersion, static_cast<std::uint32_t>(total),
-                                     static_cast<std::uint32_t>(text.size()), kJsonChunk}) {
-      head.add(word);
-    }
-    for (const char c : text) head.add(c);
-    head.add(static_cast<std::uint32_t>(binary_.size()));
-    head.add(kBinaryChunk);
-    writeAll(path, head.get(), binary_.get());
+    writeGlb(path, json, binary_);
   }
 
  private:
-  Bytes binary_;
+  std::string binary_;
   Json views_ = Json::array();
   Json accessors_ = Json::array();
 };
@@ -140,48 +135,32 @@ std::array<std::uint8_t, 3> labelColour(std::uint8_t label) {
 }
 
 void writeMapPly(const std::string& path, const MapMesh& mesh) {
-  std::string head = "ply\nformat binary_little_endian 1.0\ncomment swiftlet: map axes, z up, metres\n";
-  head += "element vertex " + std::to_string(mesh.vertices.size()) + "\n";
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"})
-    head += std::string("property float ") + name + "\n";
+  PlyElement vertices{"vertex", mesh.vertices.size(), {{"x"}, {"y"}, {"z"}, {"nx"}, {"ny"}, {"nz"}}};
   for (const char* name : {"red", "green", "blue", "label", "label_probability"}) {
-    head += std::string("property uchar ") + name + "\n";
+    vertices.properties.push_back({name, PlyType::kUint8});
   }
-  head += "element face " + std::to_string(mesh.faces.size()) +
-          "\nproperty list uchar int vertex_indices\nproperty uchar label\nend_header\n";
   constexpr std::size_t kVertexBytes = 6 * sizeof(float) + 5;
-  constexpr std::size_t kFaceBytes = 1 + 3 * sizeof(std::int32_t) + 1;
-  Bytes body;
+  std::string body;
   body.reserve(mesh.vertices.size() * kVertexBytes + mesh.faces.size() * kFaceBytes);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    body.add(mesh.vertices[i]);
-    body.add(mesh.normals[i]);
-    for (int k = 0; k < 3; ++k) body.add(mesh.grey[i]);
-    body.add(mesh.labels[i]);
-    body.add(mesh.probabilities[i]);
+    append(body, mesh.vertices[i]);
+    append(body, mesh.normals[i]);
+    for (int k = 0; k < 3; ++k) appendBytes(body, mesh.grey[i]);
+    appendBytes(body, mesh.labels[i]);
+    appendBytes(body, mesh.probabilities[i]);
   }
-  for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
-    body.add(std::uint8_t{3});
-    for (const std::uint32_t corner : mesh.faces[i]) body.add(static_cast<std::int32_t>(corner));
-    body.add(mesh.faceLabel(i));
-  }
-  writeAll(path, {head.begin(), head.end()}, body.get());
+  for (std::size_t i = 0; i < mesh.faces.size(); ++i) appendFace(body, mesh.faces[i], mesh.faceLabel(i));
+  writeAll(path, writePlyHeader({vertices, faceElement(mesh.faces.size())}, kMapComment), body);
 }
 
 void writeMapGlb(const std::string& path, const MapMesh& mesh) {
   if (mesh.faces.empty()) {
     // Accessors without elements are not allowed, so an empty map becomes an empty scene.
-    Json json = {{"asset", {{"version", "2.0"}, {"generator", "swiftlet"}}},
-                 {"scene", 0},
-                 {"scenes", {{{"name", "empty"}}}}};
-    std::string text = json.dump();
-    text.resize((text.size() + kChunkAlignment - 1) / kChunkAlignment * kChunkAlignment, ' ');
-    Bytes head;
-    for (const std::uint32_t word : {kGlbMagic, kGlbVersion, static_cast<std::uint32_t>(20 + text.size()),
-                                     static_cast<std::uint32_t>(text.size()), kJsonChunk}) {
-      head.add(word);
-    }
-    writeAll(path, head.get(), {text.begin(), text.end()});
+    writeGlb(path,
+             {{"asset", {{"version", "2.0"}, {"generator", "swiftlet"}}},
+              {"scene", 0},
+              {"scenes", {{{"name", "empty"}}}}},
+             "");
     return;
   }
   GlbBuilder glb;
@@ -193,26 +172,26 @@ void writeMapGlb(const std::string& path, const MapMesh& mesh) {
     high = high.cwiseMax(p);
   }
   Json attributes;
-  attributes["POSITION"] = glb.accessor(n, kFloat, "VEC3", false, kVertexBuffer, [&](Bytes& out) {
-    for (const Eigen::Vector3f& p : mesh.vertices) out.add(p);
+  attributes["POSITION"] = glb.accessor(n, kFloat, "VEC3", false, kVertexBuffer, [&](std::string& out) {
+    for (const Eigen::Vector3f& p : mesh.vertices) append(out, p);
   });
   glb.last()["min"] = {low.x(), low.y(), low.z()};
   glb.last()["max"] = {high.x(), high.y(), high.z()};
-  attributes["NORMAL"] = glb.accessor(n, kFloat, "VEC3", false, kVertexBuffer, [&](Bytes& out) {
-    for (const Eigen::Vector3f& normal : mesh.normals) out.add(normal);
+  attributes["NORMAL"] = glb.accessor(n, kFloat, "VEC3", false, kVertexBuffer, [&](std::string& out) {
+    for (const Eigen::Vector3f& normal : mesh.normals) append(out, normal);
   });
-  attributes["COLOR_0"] = glb.accessor(n, kUnsignedByte, "VEC4", true, kVertexBuffer, [&](Bytes& out) {
-    for (std::size_t i = 0; i < n; ++i) out.add(shown(mesh, i));
+  attributes["COLOR_0"] = glb.accessor(n, kUnsignedByte, "VEC4", true, kVertexBuffer, [&](std::string& out) {
+    for (std::size_t i = 0; i < n; ++i) appendBytes(out, shown(mesh, i));
   });
   // Four bytes per vertex, as the format's alignment requires; the last two are unused.
-  attributes["_LABEL"] = glb.accessor(n, kUnsignedByte, "VEC4", false, kVertexBuffer, [&](Bytes& out) {
+  attributes["_LABEL"] = glb.accessor(n, kUnsignedByte, "VEC4", false, kVertexBuffer, [&](std::string& out) {
     for (std::size_t i = 0; i < n; ++i) {
-      out.add(std::array<std::uint8_t, 4>{mesh.labels[i], mesh.probabilities[i], 0, 0});
+      appendBytes(out, std::array<std::uint8_t, 4>{mesh.labels[i], mesh.probabilities[i], 0, 0});
     }
   });
   const int indices =
-      glb.accessor(3 * mesh.faces.size(), kUnsignedInt, "SCALAR", false, kIndexBuffer, [&](Bytes& out) {
-        for (const auto& face : mesh.faces) out.add(face);
+      glb.accessor(3 * mesh.faces.size(), kUnsignedInt, "SCALAR", false, kIndexBuffer, [&](std::string& out) {
+        for (const auto& face : mesh.faces) appendBytes(out, face);
       });
   glb.write(path, {{"attributes", attributes}, {"indices", indices}, {"mode", kTriangles}, {"material", 0}});
 }

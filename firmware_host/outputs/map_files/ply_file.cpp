@@ -11,6 +11,7 @@
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/map_files/ply_header.hpp"
 #include "firmware_host/outputs/map_files/ply_values.hpp"
+#include "firmware_host/outputs/map_files/ply_writer.hpp"
 
 namespace swiftlet {
 namespace {
@@ -191,31 +192,19 @@ void checkWritable(const std::string& path, const TriangleMesh& mesh) {
   }
 }
 
-template <typename Number>
-void append(std::string& bytes, Number value) {
-  const std::size_t at = bytes.size();
-  bytes.resize(at + sizeof value);
-  std::memcpy(bytes.data() + at, &value, sizeof value);
-}
-
 std::string plyBytes(const TriangleMesh& mesh) {
   constexpr std::size_t kVertexBytes = 15;
-  constexpr std::size_t kFaceBytes = 14;
-  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                      std::to_string(mesh.vertices.size()) +
-                      "\nproperty float x\nproperty float y\nproperty float z\n"
-                      "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face " +
-                      std::to_string(mesh.faces.size()) +
-                      "\nproperty list uchar int vertex_indices\nproperty uchar label\nend_header\n";
+  PlyElement vertices{"vertex", mesh.vertices.size(), {{"x"}, {"y"}, {"z"}}};
+  for (const char* colour : {"red", "green", "blue"})
+    vertices.properties.push_back({colour, PlyType::kUint8});
+  std::string bytes = writePlyHeader({vertices, faceElement(mesh.faces.size())}, "");
   bytes.reserve(bytes.size() + kVertexBytes * mesh.vertices.size() + kFaceBytes * mesh.faces.size());
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
-    for (const float x : mesh.vertices[i]) append(bytes, x);
+    for (const float x : mesh.vertices[i]) appendBytes(bytes, x);
     bytes.append(3, static_cast<char>(mesh.grey.empty() ? kGreyOfNone : mesh.grey[i]));
   }
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
-    append(bytes, static_cast<std::uint8_t>(kCorners));
-    for (const std::uint32_t v : mesh.faces[i]) append(bytes, static_cast<std::int32_t>(v));
-    append(bytes, mesh.labels.empty() ? std::uint8_t{0} : mesh.labels[i]);
+    appendFace(bytes, mesh.faces[i], mesh.labels.empty() ? std::uint8_t{0} : mesh.labels[i]);
   }
   return bytes;
 }

@@ -188,6 +188,8 @@ std::size_t sizeOf(PlyType type) {
   return withNumber(type, [](auto number) { return sizeof number; });
 }
 
+std::string_view nameOf(PlyType type) { return std::ranges::find(kTypeNames, type, &TypeName::type)->name; }
+
 PlyHeader readPlyHeader(const std::string& name, std::string_view bytes) {
   return HeaderReader(name, bytes)();
 }

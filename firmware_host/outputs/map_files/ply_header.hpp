@@ -36,6 +36,8 @@ auto withNumber(PlyType type, const With& with) {
 
 /// Bytes of one value in a binary file.
 std::size_t sizeOf(PlyType type);
+/// As in a header: uchar, float.
+std::string_view nameOf(PlyType type);
 
 struct PlyProperty {
   std::string name;

@@ -1,35 +1,22 @@
 #include "firmware_host/outputs/map_files/voxel_file.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <type_traits>
 #include <vector>
 
 #include "firmware_host/files/whole_file.hpp"
+#include "firmware_host/outputs/map_files/ply_writer.hpp"
 
 namespace swiftlet {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are written as the memory has them");
-
-template <typename T>
-void addValue(std::string& to, T value) {
-  static_assert(std::is_arithmetic_v<T>);
-  to.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
-
 std::string headOf(std::size_t voxels) {
-  std::string head = "ply\nformat binary_little_endian 1.0\ncomment swiftlet: map axes, z up, metres\n";
-  head += fmt::format("element vertex {}\n", voxels);
-  for (const char* name : {"x", "y", "z", "distance", "weight"})
-    head += fmt::format("property float {}\n", name);
-  for (const char* name : {"red", "green", "blue", "label", "label_probability"})
-    head += fmt::format("property uchar {}\n", name);
-  return head + "end_header\n";
+  PlyElement element{"vertex", voxels, {{"x"}, {"y"}, {"z"}, {"distance"}, {"weight"}}};
+  for (const char* name : {"red", "green", "blue", "label", "label_probability"}) {
+    element.properties.push_back({name, PlyType::kUint8});
+  }
+  return writePlyHeader({element}, kMapComment);
 }
 
 }  // namespace
@@ -57,14 +44,14 @@ std::size_t writeVoxelPly(const std::string& path, const VoxelVolume& volume,
       if (block.weight[at] == 0) continue;
       const VoxelIndex voxel = voxelOf(index, at);
       for (const std::int32_t along : {voxel.x, voxel.y, voxel.z})
-        addValue(points, static_cast<float>((along + 0.5) * volume.settings().voxel_size));
-      addValue(points, volume.distanceStep() * static_cast<float>(block.distance[at]));
-      addValue(points, static_cast<float>(block.weight[at]) / static_cast<float>(kWeightSteps));
-      for (int i = 0; i < 3; ++i) addValue(points, block.grey[at]);
+        appendBytes(points, static_cast<float>((along + 0.5) * volume.settings().voxel_size));
+      appendBytes(points, volume.distanceStep() * static_cast<float>(block.distance[at]));
+      appendBytes(points, static_cast<float>(block.weight[at]) / static_cast<float>(kWeightSteps));
+      for (int i = 0; i < 3; ++i) appendBytes(points, block.grey[at]);
       const LabelEstimate label =
           labels != nullptr ? confusion.estimate(labels->counts[at]) : LabelEstimate{};
-      addValue(points, label.label);
-      addValue(points, static_cast<std::uint8_t>(std::lround(255 * label.probability)));
+      appendBytes(points, label.label);
+      appendBytes(points, static_cast<std::uint8_t>(std::lround(255 * label.probability)));
     }
     file.write(points);
   }
