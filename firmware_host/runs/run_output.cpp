@@ -26,7 +26,14 @@ RunInputs readRunInputs(const Settings& settings, const std::string& keep_map) {
   if (!settings.loop.in_map.empty()) {
     inputs.kept_map = std::make_unique<const KeptGraph>(readKeptFolder(settings.loop.in_map));
   }
-  if (settings.map.enabled) inputs.confusion = confusionOf(settings);
+  if (settings.map.enabled) {
+    inputs.confusion = confusionOf(settings);
+    const std::string volume = keptVolumeOf(settings.loop.in_map);
+    if (inputs.kept_map && std::filesystem::exists(volume)) {
+      checkKeptMapFile(volume, volumeSettings(settings.map_stage));
+      inputs.kept_volume = volume;
+    }
+  }
   if (!keep_map.empty()) refuseExisting(keep_map);
   return inputs;
 }
@@ -76,9 +83,8 @@ GraphOptions RunOutput::graphOptions() {
   options.kept_map = inputs_.kept_map.get();
   options.confusion = inputs_.confusion;
   options.storage = &recorder_.storage();
-  if (const std::string volume = keptVolumeOf(settings_.loop.in_map);
-      inputs_.kept_map && std::filesystem::exists(volume)) {
-    options.kept_volume = [volume](MapSubmaps& to, std::span<const WorldInMap> nodes) {
+  if (!inputs_.kept_volume.empty()) {
+    options.kept_volume = [volume = inputs_.kept_volume](MapSubmaps& to, std::span<const WorldInMap> nodes) {
       readKeptSubmaps(volume, to, nodes);
     };
   }

@@ -26,6 +26,7 @@ namespace swiftlet {
 struct RunInputs {
   std::unique_ptr<const Vocabulary> vocabulary;  ///< null: the shipped one
   std::unique_ptr<const KeptGraph> kept_map;     ///< map in which the run is located; null: none
+  std::string kept_volume;                       ///< checked file of its volume; empty: none, or no map
   std::optional<ConfusionModel> confusion;       ///< map.confusion; empty: none, or no map
 };
 

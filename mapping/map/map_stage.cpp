@@ -13,19 +13,6 @@ constexpr double kBehindVoxels = 2;
 /// VolumeSettings::most_sigma in truncation distances.
 constexpr double kMostSigma = 2;
 
-VolumeSettings volumeSettings(const MapSettings& settings) {
-  VolumeSettings volume;
-  volume.voxel_size = settings.voxel_size;
-  volume.truncation = kTruncationVoxels * settings.voxel_size;
-  volume.behind = kBehindVoxels * settings.voxel_size;
-  volume.most_sigma = kMostSigma * volume.truncation;
-  volume.memory_bytes = static_cast<std::size_t>(settings.volume_mib) << 20U;
-  volume.labels = settings.labels;
-  volume.most_range = settings.most_range;
-  volume.masked_labels = labelMask(settings.moving_labels).value_or(0);
-  return volume;
-}
-
 SurfaceSettings surfaceFor(bool has_sensor) {
   SurfaceSettings surface;
   if (has_sensor) surface.least_weight = SurfaceSettings::kLeastSensorWeight;
@@ -45,6 +32,19 @@ std::size_t mostPixels(const Rig& rig, const DepthImageView* sensor) {
 }
 
 }  // namespace
+
+VolumeSettings volumeSettings(const MapSettings& settings) {
+  VolumeSettings volume;
+  volume.voxel_size = settings.voxel_size;
+  volume.truncation = kTruncationVoxels * settings.voxel_size;
+  volume.behind = kBehindVoxels * settings.voxel_size;
+  volume.most_sigma = kMostSigma * volume.truncation;
+  volume.memory_bytes = static_cast<std::size_t>(settings.volume_mib) << 20U;
+  volume.labels = settings.labels;
+  volume.most_range = settings.most_range;
+  volume.masked_labels = labelMask(settings.moving_labels).value_or(0);
+  return volume;
+}
 
 std::optional<std::uint32_t> labelMask(std::string_view labels) {
   std::uint32_t mask = 0;

@@ -74,6 +74,9 @@ struct MapCounters {
 /// from 1 to 31.
 std::optional<std::uint32_t> labelMask(std::string_view labels);
 
+/// Settings of the volume of a map with these settings.
+VolumeSettings volumeSettings(const MapSettings& settings);
+
 class MapStage {
  public:
   /// An invalid list of moving labels counts as empty: check it first. `depth_sensor`: camera of the depth

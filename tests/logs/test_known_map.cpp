@@ -162,6 +162,7 @@ TEST_CASE("the volume of a kept map is flown in, extended and merged") {
     damaged[damaged.size() / 2] ^= 1;
     std::ofstream(map + "/volume.swm", std::ios::binary) << damaged;
     CHECK_THROWS_WITH(fly(folder.file("y"), {"", map, false}, settings), Catch::Contains("volume.swm"));
+    for (const char* refused : {"x", "y"}) CHECK_FALSE(std::filesystem::exists(folder.file(refused)));
     CHECK_NOTHROW(fly(folder.file("z"), {"", map, false}));
   }
 }

@@ -68,6 +68,7 @@ void mergeVolumes(const MapMergeRequest& request, const LoopStage& stage,
       const MapNode node = stage.node(i);
       nodes.push_back({node.frame, node.epoch, node.T_map_body, node.T_world_body});
     }
+    checkKeptMapFile(part.path, settings);
     readKeptSubmaps(part.path, submaps, nodes);
     worlds.insert(worlds.end(), nodes.begin(), nodes.end());
   }

@@ -56,8 +56,11 @@ void loadKeptMap(const std::string& name, std::istream& in, VoxelVolume& volume,
 KeptMapReport readKeptMap(const std::string& name, std::istream& in, MapStage& map);
 KeptMapReport readKeptMapFile(const std::string& path, MapStage& map);
 
-/// Loads the map as submaps that move with the nodes of its graph (KeptSubmaps). Also throws if `to` cannot
-/// store everything; then `to` holds a part.
+/// Checks the whole file for a map with `settings`; throws if anything is wrong.
+void checkKeptMapFile(const std::string& path, const VolumeSettings& settings);
+/// Call after checkKeptMapFile(): loads the map as submaps that move with the nodes of its graph
+/// (KeptSubmaps). If it throws (the file has changed since, or `to` cannot store everything), `to` holds a
+/// part.
 void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const WorldInMap> nodes);
 
 /// Settings with which the map was kept.

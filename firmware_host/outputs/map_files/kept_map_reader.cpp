@@ -379,6 +379,11 @@ KeptMapReport readKeptMapFile(const std::string& path, MapStage& map) {
   return readKeptMap(path, in, map);
 }
 
+void checkKeptMapFile(const std::string& path, const VolumeSettings& settings) {
+  std::ifstream in = opened(path);
+  static_cast<void>(checkKeptMap(path, in, settings));
+}
+
 void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const WorldInMap> nodes) {
   struct IntoSubmaps : MapTaker {
     IntoSubmaps(MapSubmaps& s, std::span<const WorldInMap> n) : submaps(s, n) {}
@@ -388,7 +393,6 @@ void readKeptSubmaps(const std::string& path, MapSubmaps& to, std::span<const Wo
   };
   if (nodes.empty()) return;
   std::ifstream in = opened(path);
-  static_cast<void>(checkKeptMap(path, in, to.volume().settings()));
   const std::uint64_t lost_before = to.stored().lost();
   IntoSubmaps taker(to, nodes);
   MapReader(path, in).walk(taker);
