@@ -12,6 +12,7 @@
 
 #include "drivers/recorded/order_by_stamp.hpp"
 #include "drivers/recorded/parse_number.hpp"
+#include "estimator/core/median.hpp"
 
 namespace swiftlet {
 namespace {
@@ -57,9 +58,7 @@ double medianNorm(const std::vector<ImuSample>& samples, Eigen::Vector3d ImuSamp
   std::vector<double> norms;
   const std::size_t step = samples.size() / kMaxProbed + 1;
   for (std::size_t i = 0; i < samples.size(); i += step) norms.push_back((samples[i].*quantity).norm());
-  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  return *middle;
+  return medianOf(norms);
 }
 
 std::vector<ImuSample> readImuRows(CsvReader& csv, LogCounters& counters, LogWarnings& warnings) {
@@ -146,9 +145,7 @@ double medianRate(const std::vector<ImuSample>& samples) {
   for (std::size_t i = 1; i < std::min(samples.size(), kMaxProbed); ++i) {
     periods.push_back((samples[i].stamp - samples[i - 1].stamp).ns);
   }
-  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
-  std::nth_element(periods.begin(), middle, periods.end());
-  return 1e9 / static_cast<double>(*middle);
+  return 1e9 / static_cast<double>(medianOf(periods));
 }
 
 std::vector<ImuSample> readImuFile(const std::string& path, LogCounters& counters, LogWarnings& warnings) {

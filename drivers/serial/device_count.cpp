@@ -1,7 +1,8 @@
 #include "drivers/serial/device_count.hpp"
 
-#include <algorithm>
 #include <limits>
+
+#include "estimator/core/median.hpp"
 
 namespace swiftlet {
 namespace {
@@ -36,8 +37,7 @@ SampleGaps::Step SampleGaps::step(std::optional<Stamp> device, std::optional<std
 std::optional<Duration> SampleGaps::usualStep() const {
   if (step_count_ < kSteps) return {};
   std::array<std::int64_t, kSteps> sorted = steps_;
-  std::nth_element(sorted.begin(), sorted.begin() + kSteps / 2, sorted.end());
-  return Duration{sorted[kSteps / 2]};
+  return Duration{medianOf(sorted)};
 }
 
 std::uint64_t SampleGaps::missingByClock(Duration step) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/core/median.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -16,14 +18,6 @@ std::size_t cellOf(const Eigen::Vector2d& pixel, const CameraModel& camera) {
   const int x = std::clamp(static_cast<int>(pixel.x() * kGridX / camera.width()), 0, kGridX - 1);
   const int y = std::clamp(static_cast<int>(pixel.y() * kGridY / camera.height()), 0, kGridY - 1);
   return static_cast<std::size_t>(y * kGridX + x);
-}
-
-// Median of the values, which are reordered; negative when there are none.
-double medianOf(std::vector<double>& values) {
-  if (values.empty()) return -1;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -137,7 +131,7 @@ void TrackSimulator::chooseKeyframe(double seconds, TrackedFrame& frame) {
   // Stamps are whole nanoseconds: half a millisecond of tolerance keeps the number of frames per interval.
   constexpr double kSlack = 5e-4;
   frame.keyframe = seconds - last_keyframe_ > settings_.keyframe_interval - kSlack ||
-                   medianOf(since_keyframe) > settings_.keyframe_motion ||
+                   (!since_keyframe.empty() && medianOf(since_keyframe) > settings_.keyframe_motion) ||
                    static_cast<double>(known) < kMinKeptShare * static_cast<double>(tracks_.size());
   for (Track& track : tracks_) {
     if (frame.keyframe) {

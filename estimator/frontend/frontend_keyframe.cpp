@@ -1,8 +1,8 @@
 // Frontend::Impl: when a frame becomes a keyframe.
 
-#include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "estimator/frontend/frontend_impl.hpp"
 
 namespace swiftlet {
@@ -10,13 +10,6 @@ namespace {
 
 // Smallest number of values for a median.
 constexpr std::size_t kMinForMedian = 5;
-
-template <std::size_t kCapacity>
-float median(FixedVector<float, kCapacity>& values) {
-  float* const middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -33,7 +26,7 @@ float Frontend::Impl::medianParallax() const {
     const double angle = std::atan2(expected.cross(track.bearing[c]).norm(), expected.dot(track.bearing[c]));
     parallax.pushBack(static_cast<float>(angle * rig_.camera[c].focal()));
   }
-  return parallax.size() < kMinForMedian ? 0.0F : median(parallax);
+  return parallax.size() < kMinForMedian ? 0.0F : medianOf(parallax);
 }
 
 bool Frontend::Impl::keyframeDue(Stamp stamp) const {

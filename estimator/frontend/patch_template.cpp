@@ -149,8 +149,8 @@ bool PatchTemplate::factor(const Eigen::Matrix2f& products, const Eigen::Vector2
   const float a = 0.25F * reduced(0, 0);
   const float b = 0.25F * reduced(0, 1);
   const float c = 0.25F * reduced(1, 1);
-  min_eigenvalue_ = 0.5F * (a + c) - std::sqrt(0.25F * (a - c) * (a - c) + b * b);
-  if (!(min_eigenvalue_ > kMinEigenvalue)) return false;
+  const float least = 0.5F * (a + c) - std::sqrt(0.25F * (a - c) * (a - c) + b * b);
+  if (!(least > kMinEigenvalue)) return false;
   // Residuals are projected on doubled gradients: (G G^T)^-1 G e = 2 (2G 2G^T)^-1 2G e.
   step_free_ = -2.0F * reduced.inverse();
   step_fixed_ = -2.0F * products.inverse();

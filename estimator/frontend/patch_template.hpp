@@ -61,9 +61,6 @@ class PatchTemplate {
   /// Zero-mean normalized cross correlation with the image at `position`, weighted, in [-1, 1].
   [[nodiscard]] float correlation(const ImageView& image, const Eigen::Vector2f& position) const;
 
-  /// Smaller eigenvalue of the Hessian per unit of weight [grey^2 / px^2].
-  [[nodiscard]] float minEigenvalue() const { return min_eigenvalue_; }
-
  private:
   static constexpr int kLanes = kPatchLanes;
   static constexpr int kRows = kPatchSize;
@@ -105,7 +102,6 @@ class PatchTemplate {
   float mean_ = 0;                                       ///< of T - 128 [grey]
   float variance_ = 0;                                   ///< of T [grey^2]
   float level_share_ = 0;  ///< share of the offset's information that remains with free position
-  float min_eigenvalue_ = 0;
   const std::uint8_t* centre_ = nullptr;
   int stride_ = 0;
 };

@@ -1,8 +1,8 @@
 #include "estimator/imu/sample_monitor.hpp"
 
-#include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "estimator/imu/integration_rule.hpp"
 
 namespace swiftlet {
@@ -52,9 +52,7 @@ void SampleMonitor::learnRate(double interval) {
     first_[interval_count_++] = interval;
     if (interval_count_ < kFirstIntervals) return;
     // Use the median: some intervals may contain gaps, and the nominal rate may be wrong.
-    const auto middle = first_.begin() + kFirstIntervals / 2;
-    std::nth_element(first_.begin(), middle, first_.end());
-    interval_sum_ = *middle * kFirstIntervals;
+    interval_sum_ = medianOf(first_) * kFirstIntervals;
   } else {
     const double mean = interval_sum_ / static_cast<double>(interval_count_);
     if (interval > kRegularPeriods * mean) return;

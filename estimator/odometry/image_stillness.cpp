@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -20,12 +22,6 @@ constexpr double kStillTime = 0.25;  // s
 constexpr double kLowPass = 0.5;  // s
 constexpr double kSettled = 1.0;  // s after the reference
 constexpr std::size_t kQuadrantTracks = 5;
-
-float median(FixedVector<float, kMaxFeatures>& values) {
-  float* const middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool before(const TrackedFeature& a, const TrackedFeature& b) { return a.id < b.id; }
 
@@ -64,7 +60,7 @@ ImageStillness::Moved ImageStillness::moved(const TrackedFrame& frame, std::size
   for (std::size_t q = 0; q < quadrants_.size(); ++q) {
     Motions& motions = quadrants_[q];
     if (motions.x.size() < kQuadrantTracks) continue;
-    const Eigen::Vector2d motion(median(motions.x), median(motions.y));
+    const Eigen::Vector2d motion(medianOf(motions.x), medianOf(motions.y));
     means_[q] += share * (motion - means_[q]);
     if (settling) settled_[q] = means_[q];
     now.pushBack(motion.norm());

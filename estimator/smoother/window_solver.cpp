@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "estimator/smoother/pixel_noise.hpp"
 
 namespace swiftlet {
@@ -149,9 +150,7 @@ double WindowSolver::medianOfNewest(const WindowProblem& problem) {
     }
   }
   if (squares_.size() < PixelNoise::kFewestSightings) return 0;
-  const auto middle = squares_.begin() + static_cast<std::ptrdiff_t>(squares_.size() / 2);
-  std::nth_element(squares_.begin(), middle, squares_.end());
-  return *middle;
+  return medianOf(squares_);
 }
 
 Status WindowSolver::solve(WindowProblem& problem, NormalEquations& system, WindowCovariance& covariance,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "estimator/frontend/lucas_kanade.hpp"
 
 namespace swiftlet {
@@ -16,12 +17,7 @@ constexpr int kLightLevel = 2;
 constexpr float kDark = 16;
 constexpr float kBright = 240;
 
-float median(std::vector<float>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+float median(std::vector<float>& values) { return values.empty() ? 0 : medianOf(values); }
 
 float greyAt(const Pyramid& pyramid, const Eigen::Vector2f& pixel) {
   const int level = std::min(kLightLevel, pyramid.levels() - 1);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -31,9 +33,7 @@ double medianStep(const std::vector<Stamp>& stamps) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < stamps.size(); ++i) steps.push_back((stamps[i] - stamps[i - 1]).seconds());
   if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return medianOf(steps);
 }
 
 void addMissing(const std::vector<Stamp>& stamps, std::vector<Finding>& findings) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/core/median.hpp"
+
 namespace swiftlet {
 namespace {
 
@@ -81,10 +83,8 @@ std::vector<double> MotionFitter::robustWeights(double shift, const Sums& sums) 
   }
   std::vector<double> weights(turns_.size(), 0);
   if (sorted.empty()) return weights;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
   // The median norm of a normal error in three axes is 1.54 sigma.
-  const double sigma = std::max(*middle / 1.54, 1e-6);
+  const double sigma = std::max(medianOf(sorted) / 1.54, 1e-6);
   for (std::size_t k = 0; k < turns_.size(); ++k) {
     if (errors[k] < 0) continue;
     const double ratio = errors[k] / (kCauchy * sigma);

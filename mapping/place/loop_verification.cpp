@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "mapping/place/hamming.hpp"
 
 namespace swiftlet {
@@ -65,9 +66,7 @@ double noiseScale(const MatchedPoints& points) {
     if (m.used) (void)ratios.tryPushBack(m.chi_squared / kMedians[static_cast<std::size_t>(m.dof() - 1)]);
   }
   if (ratios.empty()) return 1.0;
-  double* middle = ratios.begin() + ratios.size() / 2;
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return std::clamp(*middle, 1.0, kMaxNoiseScale);
+  return std::clamp(medianOf(ratios), 1.0, kMaxNoiseScale);
 }
 
 double medianDistance(const MatchedPoints& points) {
@@ -76,9 +75,8 @@ double medianDistance(const MatchedPoints& points) {
     if (m.used) (void)inverse.tryPushBack(m.inverse_depth);
   }
   if (inverse.empty()) return 0;
-  double* middle = inverse.begin() + inverse.size() / 2;
-  std::nth_element(inverse.begin(), middle, inverse.end());
-  return *middle > 0 ? 1.0 / *middle : 0;
+  const double middle = medianOf(inverse);
+  return middle > 0 ? 1.0 / middle : 0;
 }
 
 double largestSigma(const Eigen::Matrix3d& covariance) {

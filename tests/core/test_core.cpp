@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -5,6 +6,7 @@
 
 #include "estimator/core/fixed_vector.hpp"
 #include "estimator/core/image_view.hpp"
+#include "estimator/core/median.hpp"
 #include "estimator/core/random.hpp"
 #include "estimator/core/stamp.hpp"
 #include "estimator/core/status.hpp"
@@ -66,6 +68,18 @@ TEST_CASE("erasing keeps the order of the others", "[core]") {
   int sum = 0;
   for (const int x : v) sum += x;
   CHECK(sum == 5);
+}
+
+TEST_CASE("the median is the middle of the sorted values, the upper one of two", "[core]") {
+  Random random(4);
+  for (std::size_t size = 1; size < 40; ++size) {
+    FixedVector<double, 40> values;
+    while (values.size() < size) REQUIRE(values.tryPushBack(std::round(10 * random.normal())));
+    FixedVector<double, 40> sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    REQUIRE(medianOf(values) == sorted[size / 2]);
+  }
+  CHECK(medianOf(std::array{4, 1, 3, 2}) == 3);
 }
 
 TEST_CASE("an image view finds its rows by stride", "[core]") {

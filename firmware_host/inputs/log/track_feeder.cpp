@@ -1,6 +1,6 @@
 #include "firmware_host/inputs/log/track_feeder.hpp"
 
-#include <algorithm>
+#include "estimator/core/median.hpp"
 
 namespace swiftlet {
 namespace {
@@ -20,9 +20,7 @@ float medianMotion(const std::map<TrackId, Eigen::Vector2f>& before,
   }
   common = moved.size();
   if (moved.empty()) return -1.F;
-  const auto middle = moved.begin() + static_cast<std::ptrdiff_t>(moved.size() / 2);
-  std::nth_element(moved.begin(), middle, moved.end());
-  return *middle;
+  return medianOf(moved);
 }
 
 }  // namespace

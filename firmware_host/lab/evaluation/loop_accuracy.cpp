@@ -1,22 +1,12 @@
 #include "firmware_host/lab/evaluation/loop_accuracy.hpp"
 
-#include <algorithm>
 #include <vector>
 
+#include "estimator/core/median.hpp"
 #include "estimator/core/units.hpp"
 #include "estimator/geometry/so3.hpp"
 
 namespace swiftlet {
-namespace {
-
-double medianOf(std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
 
 LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& truth,
                           const AssociationOptions& options) {
@@ -44,8 +34,10 @@ LoopAccuracy loopAccuracy(std::span<const MapLoop> loops, const Trajectory& trut
     distances.push_back(distance);
     turns.push_back(degrees);
   }
-  out.median_distance = medianOf(distances);
-  out.median_degrees = medianOf(turns);
+  if (!distances.empty()) {
+    out.median_distance = medianOf(distances);
+    out.median_degrees = medianOf(turns);
+  }
   return out;
 }
 

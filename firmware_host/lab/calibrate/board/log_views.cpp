@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "drivers/recorded/open_log.hpp"
+#include "estimator/core/median.hpp"
 #include "firmware_host/lab/calibrate/board/board_detector.hpp"
 #include "firmware_host/realtime/progress.hpp"
 
@@ -55,9 +56,8 @@ double imageRate(const std::vector<BoardView>& views, std::size_t camera) {
     last = &view;
   }
   if (intervals.empty()) return 0;
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle > 0 ? 1 / *middle : 0;
+  const double middle = medianOf(intervals);
+  return middle > 0 ? 1 / middle : 0;
 }
 
 LogViews readLogViews(const LogViewsRequest& request) {

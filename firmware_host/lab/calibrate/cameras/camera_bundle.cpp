@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/core/median.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/calibrate/cameras/camera_solution.hpp"
 #include "firmware_host/lab/calibrate/cameras/lens_jacobian.hpp"
@@ -26,13 +27,6 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 double cauchy(double squared, double scale) {
   return scale > 0 ? scale * scale * std::log1p(squared / (scale * scale)) : squared;
-}
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace
@@ -66,7 +60,7 @@ bool CameraBundle::residual(const BundleView& view, const BundleCorner& corner, 
   return true;
 }
 
-std::vector<double> CameraBundle::residualNorms() const {
+double CameraBundle::medianResidual() const {
   std::vector<double> norms;
   for (const BundleView& view : views) {
     for (const BundleCorner& corner : view.corners) {
@@ -74,7 +68,7 @@ std::vector<double> CameraBundle::residualNorms() const {
       norms.push_back(residual(view, corner, r) ? r.norm() : std::numeric_limits<double>::infinity());
     }
   }
-  return norms;
+  return norms.empty() ? 0 : medianOf(norms);
 }
 
 void CameraBundle::addCorner(const BundleView& view, const BundleCorner& corner, double robust_scale,
@@ -224,10 +218,10 @@ bool CameraBundle::solve(Terms terms, double robust_scale) {
 
 bool CameraBundle::solveWithoutOutliers(double& sigma) {
   for (const double factor : {6.0, 3.0}) {
-    const double median = medianOf(residualNorms());
+    const double median = medianResidual();
     if (!std::isfinite(median) || !solve(Terms::kAll, factor * std::max(median, 1e-6))) return false;
   }
-  sigma = medianOf(residualNorms()) / kMedianLength;
+  sigma = medianResidual() / kMedianLength;
   for (int round = 0; round < kMostRounds; ++round) {
     bool changed = false;
     for (BundleView& view : views) {

@@ -60,8 +60,8 @@ class CameraBundle {
 
   /// seen - predicted; false if the lens does not reach the point.
   [[nodiscard]] bool residual(const BundleView& view, const BundleCorner& corner, Eigen::Vector2d& r) const;
-  /// Lengths of all residuals, used or not; infinite if a corner has none.
-  [[nodiscard]] std::vector<double> residualNorms() const;
+  /// px, of all residuals, used or not; infinite if a corner has none. 0 without corners.
+  [[nodiscard]] double medianResidual() const;
   /// Information on the globals with the board's pose eliminated, for corners of 1 px sigma.
   [[nodiscard]] Information information(const BundleView& view) const;
   [[nodiscard]] Information information() const;

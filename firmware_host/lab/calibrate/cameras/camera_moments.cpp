@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimator/core/median.hpp"
 #include "firmware_host/lab/calibrate/board/same_moment.hpp"
 #include "firmware_host/lab/calibrate/cameras/board_pose.hpp"
 
@@ -70,12 +71,7 @@ std::vector<Stamp> stampsOf(const std::vector<BoardView>& views, std::size_t cam
   return stamps;
 }
 
-double medianSeconds(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+double medianSeconds(std::vector<double> values) { return values.empty() ? 0 : medianOf(values); }
 
 /// s, median. From all images, with and without the board. Differences above half the image period are those
 /// of images without a partner: one that was lost, or left out because it does not show the board.

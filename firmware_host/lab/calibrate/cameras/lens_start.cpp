@@ -64,13 +64,6 @@ CameraModel firstLens(const CalibrationTarget& target, CameraKind kind, std::siz
   return best;
 }
 
-double medianNorm(const CameraBundle& bundle) {
-  std::vector<double> norms = bundle.residualNorms();
-  if (norms.empty()) return 0;
-  std::sort(norms.begin(), norms.end());
-  return norms[norms.size() / 2];
-}
-
 }  // namespace
 
 double LensFit::meanSquare(const CalibrationTarget& target, std::size_t camera,
@@ -106,7 +99,7 @@ std::optional<LensFit> fitLens(const CalibrationTarget& target, CameraKind kind,
       if (T) addView(target, view, *T, bundle);
     }
     if (bundle.views.size() < kFewestViews) return std::nullopt;
-    const double scale = 3 * std::max(1e-3, medianNorm(bundle));
+    const double scale = 3 * std::max(1e-3, bundle.medianResidual());
     if (!std::isfinite(scale) || !bundle.solve(CameraBundle::Terms::kOne, scale)) return std::nullopt;
   }
   LensFit fit;

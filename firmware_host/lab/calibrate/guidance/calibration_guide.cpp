@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "firmware_host/lab/calibrate/board/homography.hpp"
 #include "firmware_host/lab/calibrate/board/same_moment.hpp"
 
@@ -62,9 +63,7 @@ double edgeWidth(const ImageView& image, const std::vector<BoardCorner>& corners
     if (high - low > kLeastRange && steepest > 0) widths.push_back((high - low) / steepest);
   }
   if (widths.empty()) return 0;
-  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
-  std::nth_element(widths.begin(), middle, widths.end());
-  return *middle;
+  return medianOf(widths);
 }
 
 int CalibrationGuide::Camera::covered() const {

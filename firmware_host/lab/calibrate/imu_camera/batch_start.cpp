@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/core/median.hpp"
 #include "estimator/geometry/so3.hpp"
 #include "firmware_host/lab/calibrate/cameras/board_pose.hpp"
 
@@ -66,9 +67,7 @@ std::vector<CameraTurn> turnsOf(const std::vector<TimedPose>& poses) {
 double spacingOf(const std::vector<TimedPose>& poses) {
   std::vector<double> spacings;
   for (std::size_t k = 1; k < poses.size(); ++k) spacings.push_back(poses[k].time - poses[k - 1].time);
-  const auto middle = spacings.begin() + static_cast<std::ptrdiff_t>(spacings.size() / 2);
-  std::nth_element(spacings.begin(), middle, spacings.end());
-  return *middle;
+  return medianOf(spacings);
 }
 
 SE3 poseAt(const std::vector<TimedPose>& poses, double time) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "estimator/core/median.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/batch_start.hpp"
 #include "firmware_host/lab/calibrate/imu_camera/batch_verdict.hpp"
 
@@ -41,10 +42,8 @@ std::size_t markOutliers(const BatchProblem& problem, BatchData& data, double& s
     }
   }
   if (sizes.empty()) return 0;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
   constexpr double kMedianOfNormal = 0.6745;
-  sigma = *middle / kMedianOfNormal;
+  sigma = medianOf(sizes) / kMedianOfNormal;
   std::size_t outliers = 0;
   for (SeenView& view : data.views) {
     for (SeenCorner& corner : view.corners) {

@@ -9,6 +9,7 @@
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/imu_file.hpp"
+#include "estimator/core/median.hpp"
 #include "firmware_host/lab/calibrate/imu_noise/imu_source.hpp"
 #include "firmware_host/lab/calibrate/imu_noise/still_spans.hpp"
 
@@ -46,9 +47,7 @@ class Periods {
  private:
   void count() {
     if (median_ == 0 && !waiting_.empty()) {
-      const auto middle = waiting_.begin() + static_cast<std::ptrdiff_t>(waiting_.size() / 2);
-      std::ranges::nth_element(waiting_, middle);
-      median_ = *middle;
+      median_ = medianOf(waiting_);
     }
     for (const double dt : waiting_) {
       if (dt >= kHolePeriods * median_) continue;
