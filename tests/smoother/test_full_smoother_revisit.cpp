@@ -150,7 +150,18 @@ TEST_CASE("Loops make the map better, with wrong matches among them too",
   CHECK(wrong.error < 1.1 * with.error + 2e-4);
   CHECK(share(elsewhere.report.matches_used, elsewhere.report.matches) < 0.02);
   CHECK(elsewhere.error < 1.05 * without.error + 2e-4);
-  CHECK(with.error < 0.6 * without.error);
+  // One flight's ratio is 0.3 to 0.6.
+  double sum_with = with.error, sum_without = without.error;
+  for (const std::uint64_t seed : {2U, 3U}) {
+    const Prepared other = prepared(28, seed);
+    const double error_with = solve(other.full[0], other.loops({}), other.truth).error;
+    const double error_without = solve(other.full[0], {}, other.truth).error;
+    std::printf("seed %u: full %.4f m, with loops %.4f m\n", static_cast<unsigned>(seed), error_without,
+                error_with);
+    sum_with += error_with;
+    sum_without += error_without;
+  }
+  CHECK(sum_with < 0.6 * sum_without);
 }
 
 TEST_CASE("Loops bring keyframes back from far away", "[smoother][full_smoother][revisit]") {
