@@ -69,7 +69,8 @@ std::string FileTree::name(const std::string& path) const {
 
 std::string FileTree::text(const std::string& path) {
   std::vector<std::uint8_t> bytes;
-  if (!read(path, bytes)) throw InputError(name(path), 0, "", "cannot be read", "");
+  if (!read(path, bytes))
+    throw InputError(name(path), 0, "", "cannot be read", "Check that it exists and may be read");
   return {bytes.begin(), bytes.end()};
 }
 

@@ -59,7 +59,10 @@ CsvReader::CsvReader(const std::string& path, Separator separator, LogCounters& 
       counters_(&counters),
       warnings_(&warnings),
       file_(std::fopen(path.c_str(), "rb")) {
-  if (!file_) throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
+  if (!file_) {
+    throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno),
+                     "Check that it exists and may be read");
+  }
 }
 
 CsvReader::CsvReader(const std::string& name, std::string_view text, Separator separator,

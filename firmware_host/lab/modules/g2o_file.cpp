@@ -43,7 +43,10 @@ G2oFile readG2oFile(const std::string& path) {
     throw InputError(path, 0, "", "is a folder", "Give a .g2o or .g2o.xz file");
   }
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
+  if (!file) {
+    throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno),
+                     "Check that it exists and may be read");
+  }
   std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   if (bytes.size() > kMaxG2oText) {
     throw InputError(path, 0, "", "is larger than 1 GiB", "Check that it is a pose graph");
