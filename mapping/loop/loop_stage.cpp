@@ -392,7 +392,7 @@ LoopCounters LoopStage::counters() const {
 
 void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTiedEpochs>& out) const {
   out.clear();
-  const auto isTied = [&](std::uint32_t e) {
+  const auto is_tied = [&](std::uint32_t e) {
     return e == epoch || std::find(out.begin(), out.end(), e) != out.end();
   };
   // A pass may reach one epoch from another that it has just added.
@@ -404,7 +404,7 @@ void LoopStage::tiedEpochs(std::uint32_t epoch, FixedVector<std::uint32_t, kTied
       // All pieces of a kept map count as one epoch.
       const std::uint32_t a = std::min(map_.node(edge.from).epoch, kKeptEpochs);
       const std::uint32_t b = std::min(map_.node(edge.to).epoch, kKeptEpochs);
-      if (isTied(a) != isTied(b)) static_cast<void>(out.tryPushBack(isTied(a) ? b : a));
+      if (is_tied(a) != is_tied(b)) static_cast<void>(out.tryPushBack(is_tied(a) ? b : a));
     }
   }
   std::sort(out.begin(), out.end());
@@ -440,7 +440,7 @@ bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
   out.T_old_new = edge.T_from_to;
   out.information = edge.information;
   out.matches.clear();
-  const auto featureOf = [](const PlaceFeature& feature) {
+  const auto feature_of = [](const PlaceFeature& feature) {
     RevisitFeature result;
     result.has_track = feature.has_landmark;
     result.track = feature.landmark;
@@ -449,8 +449,8 @@ bool LoopStage::revisit(std::uint32_t i, LoopRevisit& out) const {
     return result;
   };
   for (const DescriptorMatch& match : inliers_[i]) {
-    out.matches.push_back({featureOf(places_[from.place].features[match.old_feature]),
-                           featureOf(places_[to.place].features[match.new_feature])});
+    out.matches.push_back({feature_of(places_[from.place].features[match.old_feature]),
+                           feature_of(places_[to.place].features[match.new_feature])});
   }
   return true;
 }

@@ -18,7 +18,6 @@ constexpr double kBehindSigmas = 3.0;
 // Two directions without depth: sine of their angle below which the point is taken at infinity.
 constexpr double kMinSine = 1e-6;
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Basis = Eigen::Matrix<double, 3, 2>;
 
 // Two unit vectors orthogonal to a unit vector, and to each other (Duff et al., 2017).
@@ -34,7 +33,7 @@ Basis tangentBasis(const Eigen::Vector3d& n) {
 // Residuals of one match: old bearing (0, 1), old depth (2), new bearing (3, 4), new depth (5); rows of
 // unknown depths stay zero. Derivatives by the point (offset, inverse depth) and by the pose.
 struct Residuals {
-  Vector6 r = Vector6::Zero();
+  Vector6d r = Vector6d::Zero();
   Eigen::Matrix<double, 6, 3> by_point = Eigen::Matrix<double, 6, 3>::Zero();
   Eigen::Matrix<double, 6, 6> by_pose = Eigen::Matrix<double, 6, 6>::Zero();
   bool in_front = false;

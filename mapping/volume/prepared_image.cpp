@@ -81,21 +81,21 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
   counters.unmeasured += pixels - measured;
   counters.beyond_range += beyond;
   const auto reference = static_cast<float>(settings.reference_sigma);
-  const auto weightOf = [reference](float sigma) {
+  const auto weight_of = [reference](float sigma) {
     const float ratio = reference / sigma;
     return std::min(std::max(kWeightSteps * ratio * ratio, 1.0F), kMostPixelWeight);
   };
   // Free up to the range, at most to where the surface may be within the error of the measurement.
-  const auto freeBefore = [least, most](float d, float sigma) {
+  const auto free_before = [least, most](float d, float sigma) {
     const float free = std::min(d - kSureSigmas * sigma, most);
     return free > least ? -free : 0.0F;
   };
   is_even_ = image.sigma == nullptr && settings.sigma_quadratic == 0;
   if (is_even_) {
     const auto sigma = static_cast<float>(settings.sigma_constant);
-    even_weight_ = weightOf(sigma);
+    even_weight_ = weight_of(sigma);
     for (std::size_t i = 0; i < pixels; ++i)
-      depth_[i] = depth_[i] > most ? freeBefore(depth_[i], sigma) : depth_[i];
+      depth_[i] = depth_[i] > most ? free_before(depth_[i], sigma) : depth_[i];
     return;
   }
   const auto constant = static_cast<float>(settings.sigma_constant);
@@ -105,12 +105,12 @@ void PreparedImage::checkPixels(const DepthImageView& image, const VolumeSetting
     const float sigma =
         image.sigma != nullptr ? image.sigma[i] : constant + quadratic * depth_[i] * depth_[i];
     const bool known = sigma > 0 && sigma < kFarAway;
-    weight_[i] = weightOf(known ? sigma : 1.0F);
+    weight_[i] = weight_of(known ? sigma : 1.0F);
     // A pixel without a valid deviation counts as unmeasured.
     if (!known) depth_[i] = 0;
     const bool far = depth_[i] > most;
     if (!known || (sigma <= most_sigma && !far) || depth_[i] <= 0) continue;
-    depth_[i] = freeBefore(depth_[i], sigma);
+    depth_[i] = free_before(depth_[i], sigma);
     counters.uncertain += far ? 0 : 1;
   }
   weight_[pixels] = 0;
