@@ -176,10 +176,8 @@ std::string toText(const Consistency& consistency) {
                        consistency.without_covariance);
   }
   return fmt::format(
-      "  NEES  pose {:.2f} (6 if consistent and the truth is exact)  rotation {:.2f} (3)  position {:.2f} "
-      "(3)  inside 3 sigma {:.1f} "
-      "%"
-      "  ({} keyframes)\n",
+      "  NEES  pose {:.2f} (6 if consistent and the truth is exact)  rotation {:.2f} (3)  "
+      "position {:.2f} (3)  inside 3 sigma {:.1f} %  ({} keyframes)\n",
       consistency.nees_pose, consistency.nees_rotation, consistency.nees_position,
       100 * consistency.inside_3_sigma, consistency.count);
 }
