@@ -70,7 +70,7 @@ std::string FileTree::name(const std::string& path) const {
 std::string FileTree::text(const std::string& path) {
   std::vector<std::uint8_t> bytes;
   if (!read(path, bytes))
-    throw InputError(name(path), 0, "", "cannot be read", "Check that it exists and may be read");
+    throw InputError(name(path), 0, "", "cannot be read", "Check that it exists and this user can read it");
   return {bytes.begin(), bytes.end()};
 }
 

@@ -61,7 +61,7 @@ CsvReader::CsvReader(const std::string& path, Separator separator, LogCounters& 
       file_(std::fopen(path.c_str(), "rb")) {
   if (!file_) {
     throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno),
-                     "Check that it exists and may be read");
+                     "Check that it exists and this user can read it");
   }
 }
 
@@ -75,7 +75,8 @@ bool CsvReader::readLine() {
   if (file_) {
     if (std::fgets(buffer_.data(), static_cast<int>(buffer_.size()), file_.get()) == nullptr) {
       if (std::ferror(file_.get()) == 0) return false;
-      throw InputError(name_, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
+      throw InputError(name_, 0, "", std::string("cannot be read: ") + std::strerror(errno),
+                       "Copy the file to a working disk");
     }
     length = ::strnlen(buffer_.data(), buffer_.size());
     if (length + 1 == buffer_.size() && buffer_[length - 1] != '\n') {

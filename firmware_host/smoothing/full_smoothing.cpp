@@ -15,7 +15,7 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kMebibyte = std::size_t{1} << 20U;
-// While reading, the memory needed is computed every so many keyframes: it takes milliseconds.
+// How often the memory needed is computed while keyframes are read: it goes through all sightings so far.
 constexpr std::size_t kCheckedEvery = 1000;
 
 bool stopped(const FullSmoothingOptions& options) {

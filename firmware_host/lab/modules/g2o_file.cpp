@@ -1,15 +1,10 @@
 #include "firmware_host/lab/modules/g2o_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 #include "drivers/input/unpack_xz.hpp"
 #include "firmware_host/files/whole_file.hpp"
 
@@ -39,15 +34,7 @@ G2oFile readG2oBytes(const std::string& name, std::string_view bytes) {
 }
 
 G2oFile readG2oFile(const std::string& path) {
-  if (std::filesystem::is_directory(path)) {
-    throw InputError(path, 0, "", "is a folder", "Give a .g2o or .g2o.xz file");
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno),
-                     "Check that it exists and may be read");
-  }
-  std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string bytes = readFile(path, "Give a .g2o or .g2o.xz file");
   if (bytes.size() > kMaxG2oText) {
     throw InputError(path, 0, "", "is larger than 1 GiB", "Check that it is a pose graph");
   }

@@ -1,14 +1,11 @@
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
 #include <limits>
-#include <memory>
 
 #include "drivers/input/input_error.hpp"
+#include "drivers/input/read_file.hpp"
 #include "firmware_host/outputs/map_files/ply_header.hpp"
 #include "firmware_host/outputs/map_files/ply_values.hpp"
 #include "firmware_host/outputs/map_files/ply_writer.hpp"
@@ -209,28 +206,6 @@ std::string plyBytes(const TriangleMesh& mesh) {
   return bytes;
 }
 
-struct FileCloser {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, FileCloser>;
-
-std::string readBytes(const std::string& path) {
-  constexpr std::size_t kChunk = 1 << 20;
-  const File file(std::fopen(path.c_str(), "rb"));
-  std::string bytes;
-  std::size_t got = file ? kChunk : 0;
-  while (got == kChunk) {
-    const std::size_t at = bytes.size();
-    bytes.resize(at + kChunk);
-    got = std::fread(bytes.data() + at, 1, kChunk, file.get());
-    bytes.resize(at + got);
-  }
-  if (!file || std::ferror(file.get()) != 0) {
-    throw InputError(path, 0, "", std::string("cannot be read: ") + std::strerror(errno), "");
-  }
-  return bytes;
-}
-
 }  // namespace
 
 void writePly(const std::string& path, const TriangleMesh& mesh, WholeFile::Sync sync) {
@@ -242,6 +217,6 @@ TriangleMesh readPlyText(const std::string& name, std::string_view bytes) {
   return MeshReader(name, bytes)();
 }
 
-TriangleMesh readPly(const std::string& path) { return readPlyText(path, readBytes(path)); }
+TriangleMesh readPly(const std::string& path) { return readPlyText(path, readFile(path, "Give a PLY file")); }
 
 }  // namespace swiftlet
