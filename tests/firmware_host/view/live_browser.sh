@@ -12,6 +12,7 @@ find_browser "$page"
 work=$(mktemp -d)
 replay=
 trap '[ -z "$replay" ] || kill "$replay" 2>/dev/null || true; rm -rf "$work"' EXIT
+: >"$work/replay.log" # read before the replay's shell may have opened it
 # Long enough for a browser on a busy machine, were it not interrupted.
 "$swiftlet" replay "$log" --real-time --speed 0.04 --map --view 127.0.0.1:0 --out "$work/run" >"$work/replay.log" 2>&1 &
 replay=$!

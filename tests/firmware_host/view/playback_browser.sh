@@ -17,6 +17,7 @@ trap '[ -z "$viewer" ] || kill "$viewer" 2>/dev/null || true; rm -rf "$work"' EX
 serve() {
   name=$1
   shift
+  : >"$work/$name.log" # read before the viewer's shell may have opened it
   "$swiftlet" view "$@" >"$work/$name.log" 2>&1 &
   viewer=$!
   url=
