@@ -30,6 +30,10 @@ constexpr std::size_t kNearSearches = 8;            // in a step, each linear in
 constexpr double kSureView = 0.75;  // as given by view(): up to 1 views are near
 constexpr int kMostMissed = 10;     // views
 
+// Views that contradict a location, less those that only agree with it since: as many as locate (min_between).
+// What agreed before says little: where two places look alike and only one was known, no view could contradict.
+constexpr int kMostAgainst = 3;
+
 PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
   PlaceDatabaseSettings out;
   out.keyframes = limits.nodes;
@@ -84,6 +88,7 @@ Status LoopStage::step(const LoopInput& input, const LoopEffort& effort, LoopRep
     } else if (describePlace(input)) {
       keepPlace();
       closeLoops(effort, report);
+      weighLocation();
     } else {
       ++counters_.without_image;
     }
@@ -135,9 +140,7 @@ void LoopStage::appendLink(const SE3& T_previous_this, const Matrix6d& covarianc
 }
 
 bool LoopStage::movedEnough(Stamp now) const {
-  if (!pending_.linked) return true;
-  const double turn = 2 * std::acos(std::min(1.0, std::abs(pending_.T_node_this.rotation.w())));
-  return pending_.T_node_this.translation.norm() > kNodeDistance || turn > kNodeTurn ||
+  return !pending_.linked || viewsDiffer(SE3(), pending_.T_node_this) ||
          (now - map_.node(map_.size() - 1).stamp).seconds() > kNodeSeconds;
 }
 
@@ -209,6 +212,7 @@ void LoopStage::keepPlace() {
 // Compares the newest node with the nearest node in the map, then with similar places.
 void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
   const auto newest = static_cast<std::uint32_t>(map_.size() - 1);
+  evidence_ = Evidence{};
   if (!hasPlace(newest) || effort.candidates == 0) return;
   Comparisons& made = comparisons_[map_.node(newest).place];
   bool tied = compareNearest(newest, effort, report);
@@ -222,7 +226,10 @@ void LoopStage::closeLoops(const LoopEffort& effort, LoopReport& report) {
     // A second loop to the same place adds little. A loop to another place may contradict the first, so that
     // a wrong map does not confirm itself.
     if (tied && view(from, shown) <= 1) continue;
-    if (isRepeated(from, newest)) continue;
+    if (isSkipped(from, newest)) {
+      evidence_.repeats = true;
+      continue;
+    }
     static_cast<void>(made.frames.tryPushBack(candidate.index));
     LoopCandidate told;
     told.similarity = static_cast<double>(candidate.relative);
@@ -261,7 +268,7 @@ bool LoopStage::compareNearest(std::uint32_t to, const LoopEffort& effort, LoopR
   static_cast<void>(made.frames.tryPushBack(map_.node(from).frame));
   LoopCandidate told;
   told.near = true;
-  const bool tied = !isRepeated(from, to) && verify(from, to, told, effort, report);
+  const bool tied = !isSkipped(from, to) && verify(from, to, told, effort, report);
   if (tied) made.near_left = 0;
   if (from < map_.kept() && map_.component(to) == map_.component(static_cast<std::uint32_t>(map_.size() - 1)))
     checkLocation(to, view(from, to), tied && agrees(newest_loop_));
@@ -284,6 +291,15 @@ void LoopStage::checkLocation(std::uint32_t to, double view, bool seen) {
   map_.releaseTies(map_.component(to));
 }
 
+/// Counts views that contradict the location. One that fits another place of the map as well contradicts too.
+void LoopStage::weighLocation() {
+  if (evidence_.contradicts) {
+    against_ = std::min(against_ + 1, kMostAgainst);
+  } else if (evidence_.agrees && !evidence_.repeats) {
+    against_ = std::max(against_ - 1, 0);
+  }
+}
+
 /// Whether the loop belongs to the set of loops that agree.
 bool LoopStage::agrees(std::uint32_t id) const {
   const LoopVerdict verdict = map_.graph().verdict(id);
@@ -304,11 +320,10 @@ double LoopStage::view(std::uint32_t a, std::uint32_t b) const {
   return std::max(distance, map_.pose(a).rotation.angularDistance(map_.pose(b).rotation) / kNearTurn);
 }
 
-/// Whether a loop between these nodes of two pieces would join the same two views as a loop that is held and
-/// not accepted. Verification repeats its error for the same views, so a vehicle that hovers in front of a
-/// look-alike would collect any number of wrong loops.
+/// Whether a loop between these nodes would join the same two views as a loop that is held and not accepted.
+/// Verification repeats its error for the same views, so a vehicle that hovers in front of a look-alike would
+/// collect any number of wrong loops.
 bool LoopStage::isRepeated(std::uint32_t from, std::uint32_t to) const {
-  if (map_.component(from) == map_.component(to)) return false;
   for (std::uint32_t id = 0; id < map_.loops(); ++id) {
     const RelativePose<SE3>& held = map_.loopEdge(id);
     if (!map_.selected(id) && map_.component(held.to) == map_.component(to) && map_.joined(held.from, from) &&
@@ -318,6 +333,11 @@ bool LoopStage::isRepeated(std::uint32_t from, std::uint32_t to) const {
     }
   }
   return false;
+}
+
+/// The same for loops that are not verified: odometry between two nodes of one piece tells which loops are wrong.
+bool LoopStage::isSkipped(std::uint32_t from, std::uint32_t to) const {
+  return map_.component(from) != map_.component(to) && isRepeated(from, to);
 }
 
 /// Finds the nearest of the nodes near `to` that it was not compared with. False if there is none.
@@ -358,6 +378,7 @@ bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told
   told.inliers = verification_.inliers.size();
   static_cast<void>(report.candidates.tryPushBack(told));
   std::uint32_t id = 0;
+  const bool again = verification_.accepted() && isRepeated(from, to);
   if (!verification_.accepted() ||
       !map_.addLoop(from, to, verification_.T_old_new, verification_.covariance, id).ok()) {
     return false;
@@ -365,6 +386,9 @@ bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told
   newest_loop_ = id;
   inliers_[id] = verification_.inliers;
   ++counters_.loops;
+  if (to + 1 == map_.size()) {
+    (again ? evidence_.repeats : agrees(id) ? evidence_.agrees : evidence_.contradicts) = true;
+  }
   counters_.kept_loops += told.kept ? 1 : 0;
   counters_.near_loops += told.near ? 1 : 0;
   return true;
@@ -377,9 +401,10 @@ void LoopStage::correct(const SmoothedWindow& window) {
   const SE3 T_world_node = now != nullptr ? now->T_world_body : node.T_world_body;
   correction_.epoch = node.epoch;
   correction_.kept_map = map_.kept() > 0;
-  correction_.located = located(static_cast<std::uint32_t>(map_.size() - 1));
+  const bool tied = located(static_cast<std::uint32_t>(map_.size() - 1));
+  if (!tied) missed_ = against_ = 0;
+  correction_.located = tied && against_ < kMostAgainst;
   correction_.T_map_world = map_.pose(map_.size() - 1) * T_world_node.inverse();
-  if (!correction_.located) missed_ = 0;
   ++correction_.version;
 }
 

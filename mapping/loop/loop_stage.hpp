@@ -18,8 +18,9 @@
 // kept map. Until loops join the flight to it, each node also tries candidates at other places after the
 // first verified one, because loops to two similar places must both be known to the selection
 // (loop_selection.hpp). Loops from the same view to the same view count once. MapCorrection::located holds
-// while these loops are accepted. They are released if ten different views in a row near kept nodes are not
-// recognized: a wrong location that nothing contradicts ends too.
+// while these loops are accepted, and ends where three more views contradict it, or fit another place as well,
+// than only agree, however many agreed before. The loops are released if ten different views in a row near
+// kept nodes are not recognized: a wrong location that nothing contradicts ends too.
 //
 // A piece that neither odometry nor loops join to others keeps its own world; an epoch of the odometry begins
 // a piece. Frames: world is that of an epoch of the odometry, map that of the first piece. Errors:
@@ -135,6 +136,13 @@ class LoopStage {
     std::size_t near_left = kMaxNearNodes;  ///< remaining comparisons with near nodes
   };
 
+  /// What the loops of a node say about the location.
+  struct Evidence {
+    bool agrees = false;
+    bool contradicts = false;
+    bool repeats = false;  ///< what an earlier view contradicted already
+  };
+
   void extendPending(const LoopInput& input);
   void bridge(const LoopInput& input);
   void appendLink(const SE3& T_previous_this, const Matrix6d& covariance);
@@ -155,8 +163,10 @@ class LoopStage {
   [[nodiscard]] bool compareNearest(std::uint32_t to, const LoopEffort& effort, LoopReport& report);
   [[nodiscard]] double view(std::uint32_t a, std::uint32_t b) const;
   void checkLocation(std::uint32_t to, double view, bool seen);
+  void weighLocation();
   [[nodiscard]] bool agrees(std::uint32_t id) const;
   [[nodiscard]] bool isRepeated(std::uint32_t from, std::uint32_t to) const;
+  [[nodiscard]] bool isSkipped(std::uint32_t from, std::uint32_t to) const;
   [[nodiscard]] bool verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told,
                             const LoopEffort& effort, LoopReport& report);
   void correct(const SmoothedWindow& window);
@@ -175,6 +185,8 @@ class LoopStage {
   std::uint32_t newest_loop_ = 0;  ///< id
   int missed_ = 0;                 ///< views in a row that a location predicts and that were not recognized
   SE3 missed_at_;                  ///< the last of them, in the odometry's world
+  Evidence evidence_;              ///< of the newest node
+  int against_ = 0;                ///< recent views that contradict the location, less those that agree
   Pending pending_;
   PlaceKeyframe newest_;
   PlaceStep place_step_;

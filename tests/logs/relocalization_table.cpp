@@ -1,9 +1,9 @@
 // Cold starts in a kept map, as rows of docs/experiments/accuracy_loops.md.
 //
-//   relocalization_table FLIGHT...               each flight's first half is the map, starts every 2 s of the
-//   rest relocalization_table --map FLIGHT FLIGHT...  the whole of one is the map; the others fly in the same
-//   world
-//   --out FOLDER keeps the run folders
+//   relocalization_table FLIGHT...               the map: each flight's first half; starts: in the rest
+//   relocalization_table --map FLIGHT FLIGHT...  the map: all of one flight; starts: in others of its world
+//
+// A start every 2 s. --out FOLDER keeps the run folders.
 //
 // A start counts as one that could be located where for half of its first 3 s the view is within 1 m and 30
 // degrees of a node of the map, by the truth. Errors are those of in_map.tum in the map's frame, which the

@@ -141,6 +141,28 @@ TEST_CASE("one view that contradicts a location is one contradiction, however of
   CHECK(flight.stage->loopCount() > report.loops);  // it was recognized
 }
 
+TEST_CASE("three views that contradict a location end it, however many agreed before") {
+  Flight flight = flightIn(mapOf({SE3()}));
+  double seconds = 0;
+  LoopReport report;
+  for (const Picture& picture : pictures().all)
+    report = flight.see(picture, seconds += kSpacing, elsewhere());
+  const double agree = report.selected;
+  REQUIRE((agree - 3) * (agree - 3) >= 3 * (agree + 3));  // the selection would keep the location
+  // Ten metres on the flight sees the same pictures again: one of the two places is not that of the map.
+  SE3 on = elsewhere();
+  on.translation.x() += 10;
+  for (const std::size_t i : {0U, 4U, 8U}) {  // views apart
+    REQUIRE(report.correction.located);
+    report = flight.see(pictures().all[i], seconds += kSpacing, on);
+  }
+  CHECK_FALSE(report.correction.located);
+  // A view that agrees brings it back.
+  report = flight.see(pictures().all[6], seconds += kSpacing, elsewhere());
+  CHECK(report.correction.located);
+  CHECK(errorOf(report, pictures().all[6]) < 0.05);
+}
+
 TEST_CASE("a hover in front of one kept view is one witness, however long it lasts") {
   KeptGraph map = mapOf({SE3()});
   for (std::size_t i = 1; i < map.nodes.size(); ++i) map.nodes[i].features.clear();
