@@ -40,10 +40,10 @@ void RunObserver::onLoop(const LoopReport& report) {
   for (const LoopCandidate& candidate : report.candidates) {
     const double ago = (candidate.new_stamp - candidate.old_stamp).seconds();
     listener_.onRemark(report.stamp,
-                       fmt::format("loop candidate {} ({}): {}; {} of {} matches agree on a relative pose",
+                       fmt::format("loop candidate {} ({}): {}; {} matches, {} features fit a relative pose",
                                    candidate.kept ? "in the kept map" : fmt::format("{:.1f} s ago", ago),
                                    candidate.near ? "by position" : "by appearance", describe(candidate.fate),
-                                   candidate.inliers, candidate.matches));
+                                   candidate.matches, candidate.inliers));
   }
   if (statistics_.located) noteLocated(report);
   listener_.onLoop(report);
