@@ -30,8 +30,9 @@ constexpr std::size_t kNearSearches = 8;            // in a step, each linear in
 constexpr double kSureView = 0.75;  // as given by view(): up to 1 views are near
 constexpr int kMostMissed = 10;     // views
 
-// Views that contradict a location, less those that only agree with it since: as many as locate (min_between).
-// What agreed before says little: where two places look alike and only one was known, no view could contradict.
+// Views that contradict a location, less those that only agree with it since: as many as locate
+// (min_between). What agreed before says little: where two places look alike and only one was known, no view
+// could contradict.
 constexpr int kMostAgainst = 3;
 
 PlaceDatabaseSettings databaseSettings(const LoopSettings& settings, const LoopLimits& limits) {
@@ -335,7 +336,8 @@ bool LoopStage::isRepeated(std::uint32_t from, std::uint32_t to) const {
   return false;
 }
 
-/// The same for loops that are not verified: odometry between two nodes of one piece tells which loops are wrong.
+/// Whether a candidate is not verified: repeated, and between two pieces. Within one the odometry tells which
+/// loops are wrong.
 bool LoopStage::isSkipped(std::uint32_t from, std::uint32_t to) const {
   return map_.component(from) != map_.component(to) && isRepeated(from, to);
 }
@@ -387,7 +389,8 @@ bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told
   inliers_[id] = verification_.inliers;
   ++counters_.loops;
   if (to + 1 == map_.size()) {
-    (again ? evidence_.repeats : agrees(id) ? evidence_.agrees : evidence_.contradicts) = true;
+    bool& said = agrees(id) ? evidence_.agrees : evidence_.contradicts;
+    (again ? evidence_.repeats : said) = true;
   }
   counters_.kept_loops += told.kept ? 1 : 0;
   counters_.near_loops += told.near ? 1 : 0;

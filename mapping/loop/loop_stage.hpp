@@ -18,9 +18,9 @@
 // kept map. Until loops join the flight to it, each node also tries candidates at other places after the
 // first verified one, because loops to two similar places must both be known to the selection
 // (loop_selection.hpp). Loops from the same view to the same view count once. MapCorrection::located holds
-// while these loops are accepted, and ends where three more views contradict it, or fit another place as well,
-// than only agree, however many agreed before. The loops are released if ten different views in a row near
-// kept nodes are not recognized: a wrong location that nothing contradicts ends too.
+// while these loops are accepted, and ends where three more views contradict it, or fit another place as
+// well, than only agree, however many agreed before. The loops are released if ten different views in a row
+// near kept nodes are not recognized: a wrong location that nothing contradicts ends too.
 //
 // A piece that neither odometry nor loops join to others keeps its own world; an epoch of the odometry begins
 // a piece. Frames: world is that of an epoch of the odometry, map that of the first piece. Errors:
