@@ -125,6 +125,8 @@ TEST_CASE("length, machine paths, unfinished work and unlisted sources are found
   CHECK(text(std::string("see /ho") + "me/anna/log").size() == 1);
   CHECK(text(std::string("cd \"/wo") + "rk/swiftlet\"").size() == 1);
   CHECK(text(std::string("// TO") + "DO: later").size() == 1);
+  CHECK(text(std::string("std::ran") + "ges::unique(edges)").size() == 1);
+  CHECK(text("std::ranges::sort(edges)").empty());
   CHECK(text(std::string("build/release/ho") + "me/log and ../shared/wo" + "rk/data").empty());
 
   CHECK(checkNamedInList(parseSource("estimator/core/a.cpp", ""), "SOURCES a.cpp").empty());

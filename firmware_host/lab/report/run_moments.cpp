@@ -210,8 +210,7 @@ nlohmann::ordered_json RunMoments::meshJson(const TriangleMesh& mesh, const SE3&
     }
   }
   std::ranges::sort(edges);
-  const auto repeated = std::ranges::unique(edges);
-  edges.erase(repeated.begin(), repeated.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   Json flat = Json::array();
   for (const auto& edge : edges) {
     for (const std::size_t end : edge) flat.push_back(end);
