@@ -389,7 +389,11 @@ bool LoopStage::verify(std::uint32_t from, std::uint32_t to, LoopCandidate& told
   inliers_[id] = verification_.inliers;
   ++counters_.loops;
   if (to + 1 == map_.size()) {
-    bool& said = agrees(id) ? evidence_.agrees : evidence_.contradicts;
+    // A loop that misfits by less than a view, for example because the odometry is too sure, is no other
+    // place.
+    const SE3 shown = map_.pose(from) * verification_.T_old_new;
+    const bool elsewhere = !agrees(id) && viewsDiffer(shown, map_.pose(to));
+    bool& said = elsewhere ? evidence_.contradicts : evidence_.agrees;
     (again ? evidence_.repeats : said) = true;
   }
   counters_.kept_loops += told.kept ? 1 : 0;
