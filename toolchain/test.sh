@@ -1,7 +1,7 @@
 #!/bin/sh
 # The tests, on a fresh Debian 12 too: the demo (12 minutes), then what guards correctness (20 to 25 on two processors).
 # usage: toolchain/test.sh [--all | --minutes N]
-#   --all        also the long and the sandbox's campaigns, the guides, sanitizers over all rooms, fuzzers: two hours
+#   --all        also the long and the sandbox's campaigns, the guides, sanitizers over all rooms, fuzzers: three hours
 #   --minutes N  also sanitizers and fuzzers, each only if it is likely to end within N minutes of the start; what is
 #                left out is listed at the end
 # Sets are CTest labels; docs/building.md says which test is in which.
