@@ -250,7 +250,7 @@ TEST_CASE("the sensor before a video node is found by enabled links") {
   CHECK(!sensorBefore(graph, {81, 0}));
   CHECK(!sensorBefore(graph, {81, 9}));
   links.push_back(link(40, 17, 13, kEnabled));
-  CHECK(!sensorBefore(graph, {81, 0}));
+  CHECK(!sensorBefore({entities, interfaces, pads, links}, {81, 0}));
 }
 
 }  // namespace swiftlet
