@@ -109,8 +109,9 @@ class Ros1Writer final : public BagWriter {
     try {
       bag_->close();
     } catch (const std::exception&) {
-      // Leaked on purpose: its destructor would try to close it again and throw.
-      static_cast<void>(bag_.release());
+      // Never destroyed, because its destructor would close it again and throw; kept, so that it is no leak.
+      static auto* const unclosed = new std::vector<rosbag::Bag*>;
+      unclosed->push_back(bag_.release());
     }
   }
 
