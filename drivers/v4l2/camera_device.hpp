@@ -56,7 +56,7 @@ class CameraDevice : public CameraSource {
   DeviceFault closedBy(const DeviceFault& fault);
 
   VideoNode node_;
-  SensorNode sensor_;  ///< open if it has the exposure controls
+  SensorSubdevice sensor_;  ///< open if it has the exposure controls
   CameraControls controls_;
   CameraDeviceSettings settings_;
   bool opened_ = false;          // at least once

@@ -121,7 +121,7 @@ std::optional<FoundSensor> sensorBefore(const MediaGraph& graph, NodeNumber vide
   return std::nullopt;
 }
 
-bool SensorNode::openBefore(int video_fd) {
+bool SensorSubdevice::openBefore(int video_fd) {
   close();
   struct stat status = {};
   if (::fstat(video_fd, &status) != 0) return false;
@@ -139,12 +139,12 @@ bool SensorNode::openBefore(int video_fd) {
   return fd_ >= 0;
 }
 
-void SensorNode::close() {
+void SensorSubdevice::close() {
   if (fd_ >= 0) ::close(fd_);
   fd_ = -1;
 }
 
-int SensorNode::width() const {
+int SensorSubdevice::width() const {
   v4l2_subdev_format format = {};
   format.which = V4L2_SUBDEV_FORMAT_ACTIVE;
   return call(VIDIOC_SUBDEV_G_FMT, &format) == 0 ? static_cast<int>(format.format.width) : 0;

@@ -39,10 +39,10 @@ struct FoundSensor {
 /// The sensor whose images reach `video` over enabled links; empty: no sensor, or one without a node.
 [[nodiscard]] std::optional<FoundSensor> sensorBefore(const MediaGraph& graph, NodeNumber video);
 
-class SensorNode : public ControlPort {
+class SensorSubdevice : public ControlPort {
  public:
-  SensorNode() = default;
-  ~SensorNode() override { close(); }
+  SensorSubdevice() = default;
+  ~SensorSubdevice() override { close(); }
 
   /// False: no sensor was found upstream of this video node, or its node cannot be opened.
   bool openBefore(int video_fd);

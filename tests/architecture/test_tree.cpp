@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <iostream>
 #include <iterator>
+#include <map>
+#include <regex>
 
 #include "tests/architecture/named_includes.hpp"
 #include "tests/architecture/rules.hpp"
@@ -99,6 +101,28 @@ TEST_CASE("headers open with #pragma once and say what they are") {
   for (const SourceFile& file : readSources(roomsAndTests())) {
     if (file.isHeader()) append(found, checkHeaderOpening(file));
   }
+  requireNone(found);
+}
+
+// Two classes of one name share inline members: the linker keeps those of either.
+TEST_CASE("no two headers define the same type") {
+  static const std::regex kNamespace(R"(^namespace ([a-z_0-9:]+) \{)");
+  static const std::regex kType(R"(^(?:class|struct|enum class|union) ([A-Z]\w*)\b(?!::)[^;]*$)");
+  std::map<std::string, std::string> defined;
+  std::vector<Violation> found;
+  for (const SourceFile& file : readSources(rooms())) {
+    if (!file.isHeader()) continue;
+    std::string space;
+    for (std::size_t i = 0; i < file.code_lines.size(); ++i) {
+      std::smatch match;
+      if (std::regex_search(file.code_lines[i], match, kNamespace)) space = match[1];
+      if (!std::regex_search(file.code_lines[i], match, kType)) continue;
+      const std::string name = space + "::" + match[1].str();
+      const std::string& first = defined.try_emplace(name, file.path).first->second;
+      if (first != file.path) found.push_back({file.path, i + 1, name + " is also defined in " + first});
+    }
+  }
+  REQUIRE(defined.size() > 100);
   requireNone(found);
 }
 

@@ -25,7 +25,7 @@ constexpr double kStrongEvidence = 10;   ///< difference of the information crit
 constexpr double kFarOff = 5;            ///< sigmas; a worse view shows something else
 
 struct Choice {
-  std::optional<LensFit> fit;
+  std::optional<LensStart> fit;
   std::string why;
 };
 
@@ -45,8 +45,8 @@ Choice chooseModel(const CameraInput& input, const std::vector<Moment>& moments,
   const auto fit = [&](CameraKind kind) {
     return fitLens(input.target, kind, camera, input.image_size[camera], start);
   };
-  const std::optional<LensFit> pinhole = fit(CameraKind::kPinholeRadtan);
-  const std::optional<LensFit> wide = fit(CameraKind::kEquidistant);
+  const std::optional<LensStart> pinhole = fit(CameraKind::kPinholeRadtan);
+  const std::optional<LensStart> wide = fit(CameraKind::kEquidistant);
   Choice choice;
   if (!pinhole || !wide) {
     choice.fit = pinhole ? pinhole : wide;

@@ -66,8 +66,8 @@ CameraModel firstLens(const CalibrationTarget& target, CameraKind kind, std::siz
 
 }  // namespace
 
-double LensFit::meanSquare(const CalibrationTarget& target, std::size_t camera,
-                           const std::vector<const Moment*>& moments, double clip_sigma) const {
+double LensStart::meanSquare(const CalibrationTarget& target, std::size_t camera,
+                             const std::vector<const Moment*>& moments, double clip_sigma) const {
   const double clip = kClipSigmas * clip_sigma;
   double sum = 0;
   double corners = 0;
@@ -84,8 +84,8 @@ double LensFit::meanSquare(const CalibrationTarget& target, std::size_t camera,
   return sum / std::max(1.0, 2 * corners);
 }
 
-std::optional<LensFit> fitLens(const CalibrationTarget& target, CameraKind kind, std::size_t camera,
-                               const Eigen::Vector2i& size, const std::vector<const Moment*>& moments) {
+std::optional<LensStart> fitLens(const CalibrationTarget& target, CameraKind kind, std::size_t camera,
+                                 const Eigen::Vector2i& size, const std::vector<const Moment*>& moments) {
   if (moments.size() < kFewestViews) return std::nullopt;
   CameraBundle bundle;
   bundle.lens[0] = firstLens(target, kind, camera, size, moments);
@@ -102,7 +102,7 @@ std::optional<LensFit> fitLens(const CalibrationTarget& target, CameraKind kind,
     const double scale = 3 * std::max(1e-3, bundle.medianResidual());
     if (!std::isfinite(scale) || !bundle.solve(CameraBundle::Terms::kOne, scale)) return std::nullopt;
   }
-  LensFit fit;
+  LensStart fit;
   if (!bundle.solveWithoutOutliers(fit.sigma) || bundle.views.size() < kFewestViews) return std::nullopt;
   fit.lens = bundle.lens[0];
   if (!(fit.lens.intrinsics().head<2>().minCoeff() > 0)) return std::nullopt;

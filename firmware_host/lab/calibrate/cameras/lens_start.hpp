@@ -15,7 +15,7 @@
 
 namespace swiftlet {
 
-struct LensFit {
+struct LensStart {
   CameraModel lens;
   double sigma = 0;  ///< px per axis, without outliers
   /// Mean square per axis [px^2] over all corners, each view posed separately; larger residuals count as
@@ -25,8 +25,8 @@ struct LensFit {
 };
 
 /// `size`: width and height [px]. Empty if the model cannot describe the lens.
-[[nodiscard]] std::optional<LensFit> fitLens(const CalibrationTarget& target, CameraKind kind,
-                                             std::size_t camera, const Eigen::Vector2i& size,
-                                             const std::vector<const Moment*>& moments);
+[[nodiscard]] std::optional<LensStart> fitLens(const CalibrationTarget& target, CameraKind kind,
+                                               std::size_t camera, const Eigen::Vector2i& size,
+                                               const std::vector<const Moment*>& moments);
 
 }  // namespace swiftlet
