@@ -1,14 +1,13 @@
 #pragma once
 // Reads files of recorded messages: rosbag2 folders (SQLite or MCAP), their single files, MCAP files, and ROS
-// 1 bags if the build has rosbag-storage. Messages stay bytes here; drivers/bag/ros_messages.hpp decodes
-// them.
+// 1 bags. Messages stay bytes here; drivers/bag/ros_messages.hpp decodes them.
 //
 // Order: by the time at which the recorder received a message; equal times in the file's order. Errors:
 // InputError with file, byte or row, and the remedy. Every read is bounds-checked and checksums are verified
 // if present: a damaged file is rejected when it is opened or when the damaged message is read. If the
 // recorder did not close the file, its intact part is read and a warning names the byte where it ends.
-// Memory: 24 bytes per message, and four decompressed chunks of an MCAP file. Threads: one per file. Host
-// side only.
+// Memory: 24 bytes per message, and four decompressed chunks of an MCAP file or ROS 1 bag. Threads: one per
+// file. Host side only.
 
 #include <cstdint>
 #include <memory>
@@ -76,7 +75,7 @@ class BagFile {
 /// True for a rosbag2 folder and for a file whose first bytes are those of a bag, also compressed with zstd.
 [[nodiscard]] bool isBag(const std::string& path);
 
-/// The kind is detected from the content. InputError also if this build has no reader for it.
+/// The kind is detected from the content.
 [[nodiscard]] std::unique_ptr<BagFile> openBag(const std::string& path);
 
 }  // namespace swiftlet

@@ -3,7 +3,7 @@
 //
 // An interrupted program leaves a partial file under the given path. To get a complete file or none, give a
 // temporary path and rename it after finish(). Errors: InputError if the disk accepts no more data. Memory: a
-// chunk of 1 MiB and 16 bytes per message in it (MCAP), plus that of the libraries. Threads: one per file.
+// chunk of 1 MiB and 16 bytes per message in it, plus that of the libraries. Threads: one per file.
 // Host side only.
 
 #include <cstdint>
@@ -47,6 +47,9 @@ class BagWriter {
 enum class McapPacking : std::uint8_t { kZstd, kNone };
 
 [[nodiscard]] std::unique_ptr<BagWriter> makeMcapWriter(const std::string& path, McapPacking packing);
+
+/// Writes without compression, with the same bytes as ROS's own rosbag.
+[[nodiscard]] std::unique_ptr<BagWriter> makeRos1Writer(const std::string& path);
 
 /// Creates the folder. `name`: prefix of the file in it, `<name>_0.db3`.
 [[nodiscard]] std::unique_ptr<BagWriter> makeRosbag2Writer(const std::string& folder,

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <limits>
 #include <map>
 
+#include "drivers/bag/chunk_cache.hpp"
 #include "drivers/bag/file_bytes.hpp"
 #include "drivers/bag/mcap_records.hpp"
 #include "drivers/bag/unpack.hpp"
@@ -20,10 +19,6 @@ namespace {
 using Bytes = std::span<const std::uint8_t>;
 using mcap::crcOf;
 using mcap::Op;
-
-constexpr std::uint32_t kNoChunk = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint64_t kMostUnpacked = std::uint64_t{1} << 30U;  // bytes per chunk; writers make 1 to 4 MiB
-constexpr std::size_t kChunksKept = 4;
 
 std::string_view textOf(Bytes bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
@@ -59,11 +54,6 @@ class McapFile final : public BagFile {
     std::uint32_t crc = 0;  ///< 0: no checksum
     Packing packing = Packing::kNone;
   };
-  struct Unpacked {
-    std::uint32_t chunk = kNoChunk;
-    std::uint64_t used = 0;  ///< number of the last use
-    std::vector<std::uint8_t> bytes;
-  };
 
   [[noreturn]] void fail(std::uint64_t at, const std::string& what) const;
   void findEnd();
@@ -97,8 +87,7 @@ class McapFile final : public BagFile {
   std::vector<Chunk> chunks_;
   std::size_t before_chunk_ = 0;  ///< number of entries before those of the newest chunk
   bool chunk_open_ = false;       ///< further indexes of the newest chunk may follow
-  std::array<Unpacked, kChunksKept> kept_;
-  std::uint64_t uses_ = 0;
+  ChunkCache cache_;
   std::vector<std::uint8_t> packed_;
   std::vector<std::uint8_t> message_;  ///< decompressed
 };
@@ -259,7 +248,7 @@ bool McapFile::takeRecord(std::uint64_t& at) {
       break;
     case Op::kMessage:
       outside_ = true;
-      takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), kNoChunk, at, at);
+      takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), ChunkCache::kNone, at, at);
       break;
     case Op::kChunk:
       takeChunk(at, content, length);
@@ -383,34 +372,21 @@ void McapFile::scanChunk(std::uint32_t chunk, bool messages) {
 }
 
 Bytes McapFile::unpackedChunk(std::uint32_t index) {
-  ++uses_;
-  Unpacked* oldest = kept_.data();
-  for (Unpacked& kept : kept_) {
-    if (kept.chunk == index) {
-      kept.used = uses_;
-      return kept.bytes;
-    }
-    if (kept.used < oldest->used) oldest = &kept;
-  }
   const Chunk& chunk = chunks_[index];
-  oldest->chunk = kNoChunk;
-  file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), packed_);
-  if (packed_.size() != chunk.packed ||
-      !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), oldest->bytes)) {
-    fail(chunk.record, "a chunk cannot be decompressed");
-  }
-  if (chunk.crc != 0 && crcOf(0, oldest->bytes) != chunk.crc) {
-    fail(chunk.record, "a chunk's checksum is wrong");
-  }
-  oldest->chunk = index;
-  oldest->used = uses_;
-  return oldest->bytes;
+  return cache_.at(index, [&](std::vector<std::uint8_t>& out) {
+    file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), packed_);
+    if (packed_.size() != chunk.packed ||
+        !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), out)) {
+      fail(chunk.record, "a chunk cannot be decompressed");
+    }
+    if (chunk.crc != 0 && crcOf(0, out) != chunk.crc) fail(chunk.record, "a chunk's checksum is wrong");
+  });
 }
 
 Bytes McapFile::read(const BagEntry& entry) {
   Bytes record;
   std::uint64_t place = entry.at;
-  if (entry.part == kNoChunk) {
+  if (entry.part == ChunkCache::kNone) {
     const std::uint64_t length = LittleFieldReader(file_.at(entry.at + 1, sizeof(std::uint64_t))).u64();
     file_.read(entry.at, static_cast<std::size_t>(mcap::kRecordHead + length), packed_);
     record = packed_;

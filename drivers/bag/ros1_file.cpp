@@ -1,188 +1,333 @@
 #include "drivers/bag/ros1_file.hpp"
 
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
+#include <fmt/format.h>
 
-#include <cstring>
-#include <exception>
+#include <algorithm>
+#include <map>
 
+#include "drivers/bag/chunk_cache.hpp"
+#include "drivers/bag/file_bytes.hpp"
+#include "drivers/bag/ros1_records.hpp"
+#include "drivers/bag/unpack.hpp"
 #include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
+namespace ros1 {
 namespace {
 
-/// A message of any type as bytes; the traits below give its type when rosbag first sees a topic.
-struct RawMessage {
-  const BagWriterTopic* topic = nullptr;
-  std::span<const std::uint8_t> body;
-};
+constexpr std::uint32_t kMostHeader = std::uint32_t{1} << 16U;  // bytes; the longest field is a topic's name
+constexpr std::size_t kIndexEntry = 12;                         // bytes: time and offset
 
-}  // namespace
-}  // namespace swiftlet
+Stamp readTime(LittleFieldReader& reader) {
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  const std::int64_t seconds = reader.u32();
+  return Stamp{seconds * kNsPerSecond + reader.u32()};
+}
 
-namespace ros {
-namespace message_traits {
-template <>
-struct MD5Sum<swiftlet::RawMessage> {
-  static const char* value(const swiftlet::RawMessage& message) { return message.topic->md5.c_str(); }
-};
-template <>
-struct DataType<swiftlet::RawMessage> {
-  static const char* value(const swiftlet::RawMessage& message) { return message.topic->type.c_str(); }
-};
-template <>
-struct Definition<swiftlet::RawMessage> {
-  static const char* value(const swiftlet::RawMessage& message) { return message.topic->definition.c_str(); }
-};
-}  // namespace message_traits
-namespace serialization {
-template <>
-struct Serializer<swiftlet::RawMessage> {
-  template <typename Stream>
-  static void write(Stream& stream, const swiftlet::RawMessage& message) {
-    const auto size = static_cast<std::uint32_t>(message.body.size());
-    if (size > 0) std::memcpy(stream.advance(size), message.body.data(), size);
-  }
-  static std::uint32_t serializedLength(const swiftlet::RawMessage& message) {
-    return static_cast<std::uint32_t>(message.body.size());
-  }
-};
-}  // namespace serialization
-}  // namespace ros
-
-namespace swiftlet {
-namespace {
-
-class Ros1File final : public BagFile {
+class File final : public BagFile {
  public:
-  Ros1File(const std::string& path, const std::string& name) : BagFile(name) {
-    translated([&] {
-      bag_.open(path, rosbag::bagmode::Read);
-      view_ = std::make_unique<rosbag::View>(bag_);
-      for (const rosbag::MessageInstance& message : *view_) {
-        const std::uint32_t topic = topicOf(message.getTopic(), message.getDataType(), BagEncoding::kRos1,
-                                            message.getMessageDefinition());
-        entries_.push_back(
-            {Stamp{static_cast<std::int64_t>(message.getTime().toNSec())}, topic, 0, messages_.size()});
-        messages_.push_back(message);
-      }
-    });
-    orderEntries();
-  }
-
-  std::span<const std::uint8_t> read(const BagEntry& entry) override {
-    translated([&] {
-      const rosbag::MessageInstance& message = messages_[entry.at];
-      body_.resize(message.size());
-      ros::serialization::OStream stream(body_.data(), static_cast<std::uint32_t>(body_.size()));
-      message.write(stream);
-    });
-    return body_;
-  }
+  File(const std::string& path, const std::string& name);
+  Bytes read(const BagEntry& entry) override;
 
  private:
-  template <typename Call>
-  void translated(Call&& call) const {
-    try {
-      call();
-    } catch (const std::exception& error) {
-      // Not only rosbag's: damaged lengths and types reach boost, pluginlib and the allocator.
-      throw InputError(path_, 0, "", std::string("not a readable bag (") + error.what() + ")",
-                       "`rosbag reindex` repairs an interrupted recording");
-    }
-  }
-
-  rosbag::Bag bag_;
-  std::unique_ptr<rosbag::View> view_;
-  std::vector<rosbag::MessageInstance> messages_;
-  std::vector<std::uint8_t> body_;
-};
-
-class Ros1Writer final : public BagWriter {
- public:
-  explicit Ros1Writer(const std::string& path) : BagWriter(path) {
-    translated([&] { bag_->open(path_, rosbag::bagmode::Write); });
-  }
-  Ros1Writer(const Ros1Writer&) = delete;
-  Ros1Writer& operator=(const Ros1Writer&) = delete;
-  ~Ros1Writer() override {
-    try {
-      bag_->close();
-    } catch (const std::exception&) {
-      // Never destroyed, because its destructor would close it again and throw; kept, so that it is no leak.
-      static auto* const unclosed = new std::vector<rosbag::Bag*>;
-      unclosed->push_back(bag_.release());
-    }
-  }
-
-  [[nodiscard]] BagEncoding encoding() const override { return BagEncoding::kRos1; }
-
-  std::uint32_t addTopic(const BagWriterTopic& topic) override {
-    Topic added{topic, nullptr};
-    if (topic.latched) {
-      // A player needs this to repeat the last message to late subscribers.
-      added.fields = boost::make_shared<ros::M_string>();
-      (*added.fields)["topic"] = topic.name;
-      (*added.fields)["type"] = topic.type;
-      (*added.fields)["md5sum"] = topic.md5;
-      (*added.fields)["message_definition"] = topic.definition;
-      (*added.fields)["latching"] = "1";
-    }
-    topics_.push_back(added);
-    return static_cast<std::uint32_t>(topics_.size() - 1);
-  }
-
-  void write(std::uint32_t topic, Stamp log_time, std::uint32_t /*sequence*/,
-             std::span<const std::uint8_t> body) override {
-    const Topic& to = topics_[topic];
-    ros::Time time;
-    time.fromNSec(static_cast<std::uint64_t>(log_time.ns));
-    translated([&] { bag_->write(to.about.name, time, RawMessage{&to.about, body}, to.fields); });
-    ++messages_;
-  }
-
-  void finish() override {
-    translated([&] {
-      bag_->close();
-      // rosbag does not report a disk that fills up while closing, so the file is checked.
-      rosbag::Bag written(path_, rosbag::bagmode::Read);
-      if (rosbag::View(written).size() != messages_) {
-        throw rosbag::BagIOException("messages are missing in the written file");
-      }
-    });
-  }
-
- private:
-  struct Topic {
-    BagWriterTopic about;
-    boost::shared_ptr<ros::M_string> fields;
+  struct Chunk {
+    std::uint64_t record = 0;  ///< byte where its record begins
+    std::uint64_t data = 0;    ///< byte where its compressed records begin
+    std::uint32_t packed = 0;
+    std::uint32_t unpacked = 0;
+    Packing packing = Packing::kNone;
   };
 
-  template <typename Call>
-  void translated(Call&& call) const {
-    try {
-      call();
-    } catch (const std::exception& error) {
-      throw InputError(path_, 0, "", std::string("cannot be written (") + error.what() + ")",
-                       "Check that the folder exists and is writable and the disk is not full");
-    }
-  }
+  [[noreturn]] void fail(std::uint64_t at, const std::string& what) const;
+  /// Number in the header of the record at `place`.
+  std::uint32_t numberOf(Bytes header, const char* name, std::uint64_t place) const;
+  /// Its bytes are valid until the next call to file_.at().
+  Head headAt(std::uint64_t at, std::uint64_t end);
+  void readBagRecord();
+  void readTail();
+  void walk();
+  void takeRecord(const Head& head, std::uint64_t at);
+  void takeConnection(Bytes header, Bytes data, std::uint64_t place);
+  void takeChunk(const Head& head, std::uint64_t at);
+  void takeIndex(const Head& head, std::uint64_t at);
+  BagEntry entryOf(Bytes header, std::uint32_t part, std::uint64_t at, std::uint64_t place) const;
+  void closeChunk();
+  void scanChunk(std::uint32_t chunk, bool messages);
+  void endEarly(std::uint64_t at);
+  Bytes unpackedChunk(std::uint32_t chunk);
 
-  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
-  std::vector<Topic> topics_;
-  std::uint64_t messages_ = 0;
+  FileBytes file_;
+  std::uint64_t data_end_ = 0;  ///< byte where the tail begins; the file's end if it was not closed
+  bool finished_ = false;       ///< the tail is complete
+  std::uint32_t chunk_count_ = 0;
+  std::uint64_t count_ = 0;                             ///< number of messages by the tail
+  std::map<std::uint32_t, std::uint32_t> connections_;  ///< indexes of topics
+  std::vector<Chunk> chunks_;
+  std::size_t before_chunk_ = 0;  ///< number of entries before those of the newest chunk
+  bool chunk_open_ = false;       ///< further indexes of the newest chunk may follow
+  ChunkCache cache_;
+  std::vector<std::uint8_t> packed_;
 };
 
+File::File(const std::string& path, const std::string& name) : BagFile(name), file_(path, name) {
+  readBagRecord();
+  if (finished_) readTail();
+  walk();
+  if (finished_ && count_ != entries_.size()) {
+    fail(data_end_, fmt::format("it counts {} messages, but holds {}", count_, entries_.size()));
+  }
+  orderEntries();
+}
+
+void File::fail(std::uint64_t at, const std::string& what) const {
+  throw InputError(path_, 0, fmt::format("byte {}", at), what,
+                   "The file is damaged: copy it again, or recover the intact part with `rosbag reindex`");
+}
+
+std::uint32_t File::numberOf(Bytes header, const char* name, std::uint64_t place) const {
+  const std::optional<std::uint32_t> value = number(header, name);
+  if (!value) fail(place, fmt::format("a record's field {} is missing or damaged", name));
+  return *value;
+}
+
+Head File::headAt(std::uint64_t at, std::uint64_t end) {
+  const std::uint32_t length = LittleFieldReader(file_.at(at, sizeof(std::uint32_t))).u32();
+  if (length > kMostHeader) fail(at, "a record's header is damaged");
+  const Head head = headOf(file_.at(at, length + 2 * sizeof(std::uint32_t)));
+  if (head.op == Op{}) fail(at, "a record's header is damaged");
+  if (at + head.size > end || head.length > end - at - head.size) fail(at, "a record extends past the data");
+  return head;
+}
+
+void File::readBagRecord() {
+  const std::uint64_t at = kMagic.size();
+  if (textOf(file_.at(0, at)) != kMagic) fail(0, "is not a ROS 1 bag of format 2.0");
+  const Head head = headAt(at, file_.size());
+  if (head.op != Op::kBag) fail(at, "does not begin with a bag's header");
+  if (const auto encryptor = field(head.header, "encryptor"); encryptor && !encryptor->empty()) {
+    throw InputError(path_, 0, fmt::format("byte {}", at),
+                     fmt::format("is encrypted with {}", textOf(*encryptor)),
+                     "Decrypt it with `rosbag decrypt`");
+  }
+  const std::optional<Bytes> index = field(head.header, "index_pos");
+  if (!index || index->size() != sizeof(std::uint64_t)) fail(at, "the bag's header has no field index_pos");
+  data_end_ = LittleFieldReader(*index).u64();
+  chunk_count_ = numberOf(head.header, "chunk_count", at);
+  finished_ = data_end_ != 0 && data_end_ <= file_.size();
+  if (!finished_) data_end_ = file_.size();
+}
+
+/// The connections again, so that the index of a chunk can be read without the chunk, and the chunks' counts.
+void File::readTail() {
+  constexpr std::size_t kCount = 8;  // bytes: connection and number of messages
+  std::uint32_t infos = 0;
+  try {
+    for (std::uint64_t at = data_end_; at < file_.size();) {
+      const Head head = headAt(at, file_.size());
+      if (head.op == Op::kConnection) takeRecord(head, at);
+      if (head.op == Op::kChunkInfo) {
+        ++infos;
+        LittleFieldReader counts(file_.at(at + head.size, head.length));
+        while (counts.left() >= kCount) {
+          counts.skip(sizeof(std::uint32_t));
+          count_ += counts.u32();
+        }
+      }
+      at += head.size + head.length;
+    }
+    finished_ = infos == chunk_count_;
+  } catch (const InputError&) {
+    finished_ = false;
+  }
+  if (!finished_) data_end_ = file_.size();
+}
+
+void File::walk() {
+  std::uint64_t at = kMagic.size();
+  try {
+    while (at < data_end_) {
+      const Head head = headAt(at, data_end_);
+      const std::uint64_t next = at + head.size + head.length;
+      takeRecord(head, at);
+      at = next;
+    }
+    if (finished_ && chunk_open_) closeChunk();
+  } catch (const InputError&) {
+    if (finished_) throw;
+  }
+  if (!finished_) endEarly(at);
+}
+
+void File::endEarly(std::uint64_t at) {
+  // Some indexes of the newest chunk may be missing: read its records instead.
+  if (chunk_open_) {
+    entries_.resize(before_chunk_);
+    try {
+      scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+    } catch (const InputError&) {
+      entries_.resize(before_chunk_);
+      at = chunks_.back().record;
+    }
+  }
+  warnings_.push_back(fmt::format(
+      "{}: not closed by its recorder, or truncated: {} messages up to byte {} are intact and are read",
+      path_, entries_.size(), at));
+}
+
+void File::takeRecord(const Head& head, std::uint64_t at) {
+  if (head.op != Op::kIndex && chunk_open_) closeChunk();
+  switch (head.op) {
+    case Op::kConnection: {
+      const Bytes record = file_.at(at, head.size + head.length);
+      takeConnection(headOf(record).header, record.subspan(head.size), at);
+      break;
+    }
+    case Op::kChunk:
+      takeChunk(head, at);
+      break;
+    case Op::kIndex:
+      takeIndex(head, at);
+      break;
+    case Op::kMessage:  // of a chunk that was being written when the recorder ended
+      entries_.push_back(entryOf(head.header, ChunkCache::kNone, at, at));
+      break;
+    default:
+      break;
+  }
+}
+
+void File::takeConnection(Bytes header, Bytes data, std::uint64_t place) {
+  const std::uint32_t id = numberOf(header, "conn", place);
+  const auto name = field(header, "topic");
+  const auto type = field(data, "type");
+  if (!name || !type) fail(place, "a connection is damaged");
+  const auto definition = field(data, "message_definition");
+  const std::uint32_t topic =
+      topicOf(textOf(*name), textOf(*type), BagEncoding::kRos1, textOf(definition.value_or(Bytes{})));
+  const auto [known, added] = connections_.emplace(id, topic);
+  if (!added && known->second != topic) {
+    fail(place, fmt::format("connection {} is defined twice, for {} and for {}", id,
+                            topics_[known->second].name, topics_[topic].name));
+  }
+}
+
+void File::takeChunk(const Head& head, std::uint64_t at) {
+  Chunk chunk;
+  chunk.record = at;
+  chunk.data = at + head.size;
+  chunk.packed = head.length;
+  chunk.unpacked = numberOf(head.header, "size", at);
+  const std::string_view packing = textOf(field(head.header, "compression").value_or(Bytes{}));
+  if (packing == "bz2") {
+    chunk.packing = Packing::kBz2;
+  } else if (packing == "lz4") {
+    chunk.packing = Packing::kLz4;
+  } else if (packing != "none") {
+    fail(at, fmt::format("a chunk is compressed with `{}`, which is none of none, bz2 and lz4", packing));
+  }
+  if (chunk.unpacked > kMostUnpacked)
+    fail(at, fmt::format("a chunk of {} bytes is too large", chunk.unpacked));
+  before_chunk_ = entries_.size();
+  chunk_open_ = true;
+  chunks_.push_back(chunk);
+}
+
+/// Reads the records of a chunk that has no index.
+void File::closeChunk() {
+  if (entries_.size() == before_chunk_) scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
+  chunk_open_ = false;
+}
+
+void File::takeIndex(const Head& head, std::uint64_t at) {
+  const std::uint32_t connection = numberOf(head.header, "conn", at);
+  const bool known_version = numberOf(head.header, "ver", at) == kIndexVersion;
+  const std::uint64_t count = numberOf(head.header, "count", at);
+  if (!known_version || !chunk_open_ || count * kIndexEntry != head.length)
+    fail(at, "a chunk's index is damaged");
+  if (count == 0) return;
+  const auto chunk = static_cast<std::uint32_t>(chunks_.size() - 1);
+  if (!connections_.contains(connection)) scanChunk(chunk, false);
+  const auto known = connections_.find(connection);
+  if (known == connections_.end()) {
+    fail(at, fmt::format("a chunk's index names connection {}, which does not exist", connection));
+  }
+  LittleFieldReader reader(file_.at(at + head.size, head.length));
+  while (reader.left() > 0) {
+    const Stamp time = readTime(reader);
+    const std::uint32_t offset = reader.u32();
+    if (offset >= chunks_[chunk].unpacked) fail(at, "a chunk's index points outside of it");
+    entries_.push_back({time, known->second, chunk, offset});
+  }
+}
+
+BagEntry File::entryOf(Bytes header, std::uint32_t part, std::uint64_t at, std::uint64_t place) const {
+  const std::uint32_t connection = numberOf(header, "conn", place);
+  const auto known = connections_.find(connection);
+  const auto time = field(header, "time");
+  if (!time || time->size() != sizeof(std::uint64_t)) fail(place, "a message has no time");
+  if (known == connections_.end()) {
+    fail(place, fmt::format("a message of connection {}, which does not exist", connection));
+  }
+  LittleFieldReader reader(*time);
+  return {readTime(reader), known->second, part, at};
+}
+
+void File::scanChunk(std::uint32_t chunk, bool messages) {
+  const Bytes records = unpackedChunk(chunk);
+  const std::uint64_t place = chunks_[chunk].record;
+  for (std::size_t at = 0; at < records.size();) {
+    const Head head = headOf(records.subspan(at));
+    if (head.op == Op{} || head.length > records.size() - at - head.size) {
+      fail(place, fmt::format("the record at {} of this chunk is damaged", at));
+    }
+    const Bytes data = records.subspan(at + head.size, head.length);
+    if (head.op == Op::kConnection) takeConnection(head.header, data, place);
+    if (head.op == Op::kMessage && messages) entries_.push_back(entryOf(head.header, chunk, at, place));
+    at += head.size + head.length;
+  }
+}
+
+Bytes File::unpackedChunk(std::uint32_t index) {
+  const Chunk& chunk = chunks_[index];
+  return cache_.at(index, [&](std::vector<std::uint8_t>& out) {
+    file_.read(chunk.data, chunk.packed, packed_);
+    if (packed_.size() != chunk.packed || !unpack(chunk.packing, packed_, chunk.unpacked, out)) {
+      fail(chunk.record, "a chunk cannot be decompressed");
+    }
+  });
+}
+
+Bytes File::read(const BagEntry& entry) {
+  Bytes records;
+  std::uint64_t place = entry.at;
+  if (entry.part == ChunkCache::kNone) {
+    const Head head = headAt(entry.at, data_end_);
+    file_.read(entry.at, head.size + head.length, packed_);
+    records = packed_;
+  } else {
+    records = unpackedChunk(entry.part);
+    records = records.subspan(std::min<std::size_t>(entry.at, records.size()));
+    place = chunks_[entry.part].record;
+  }
+  Head head = headOf(records);
+  // rosbag's index may point to the connection that its first message follows.
+  while (head.op == Op::kConnection && head.length <= records.size() - head.size) {
+    records = records.subspan(head.size + head.length);
+    head = headOf(records);
+  }
+  const bool fits = head.op == Op::kMessage && head.length <= records.size() - head.size;
+  const BagEntry found = fits ? entryOf(head.header, entry.part, entry.at, place) : BagEntry{};
+  if (!fits || found.topic != entry.topic || found.log_time != entry.log_time) {
+    fail(place, "a chunk's index does not point to its message");
+  }
+  return records.subspan(head.size, head.length);
+}
+
 }  // namespace
+}  // namespace ros1
 
 std::unique_ptr<BagFile> openRos1File(const std::string& path, const std::string& name) {
-  return std::make_unique<Ros1File>(path, name);
+  return std::make_unique<ros1::File>(path, name);
 }
-
-std::unique_ptr<BagWriter> makeRos1Writer(const std::string& path) {
-  return std::make_unique<Ros1Writer>(path);
-}
-
-bool hasRos1Bags() { return true; }
 
 }  // namespace swiftlet

@@ -1,5 +1,6 @@
 #include "drivers/bag/unpack.hpp"
 
+#include <bzlib.h>
 #include <fmt/format.h>
 #include <lz4frame.h>
 #include <unistd.h>
@@ -79,6 +80,25 @@ bool unpackLz4(std::span<const std::uint8_t> packed, std::size_t most, std::vect
   });
 }
 
+bool unpackBz2(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
+  bz_stream stream{};
+  if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return false;
+  const std::unique_ptr<bz_stream, decltype(&BZ2_bzDecompressEnd)> end(&stream, &BZ2_bzDecompressEnd);
+  // The library does not write to its input, though it takes it as writable.
+  stream.next_in = const_cast<char*>(reinterpret_cast<const char*>(packed.data()));
+  stream.avail_in = static_cast<unsigned>(packed.size());
+  return unpackGrowing(most, out, [&](std::uint8_t* to, std::size_t room, std::size_t& written, bool& done) {
+    const unsigned before = stream.avail_in;
+    stream.next_out = reinterpret_cast<char*>(to);
+    stream.avail_out = static_cast<unsigned>(room);
+    const int result = BZ2_bzDecompress(&stream);
+    if (result != BZ_OK && result != BZ_STREAM_END) return false;
+    written = room - stream.avail_out;
+    done = result == BZ_STREAM_END && stream.avail_in == 0;
+    return done || (result == BZ_OK && (written > 0 || stream.avail_in < before));
+  });
+}
+
 [[noreturn]] void failToUnpack(const std::string& file, std::size_t at, const char* what) {
   throw InputError(file, 0, fmt::format("byte {}", at), what,
                    "Copy it again, or decompress it with `zstd -d` and give the decompressed bag");
@@ -129,6 +149,9 @@ bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t s
       break;
     case Packing::kZstd:
       if (!unpackZstd(packed, size, out)) return false;
+      break;
+    case Packing::kBz2:
+      if (!unpackBz2(packed, size, out)) return false;
       break;
   }
   return out.size() == size;

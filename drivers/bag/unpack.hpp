@@ -1,5 +1,5 @@
 #pragma once
-// Decompresses zstd and LZ4 frames of bags.
+// Decompresses zstd, LZ4 and bzip2 data of bags.
 //
 // Errors: false, and `out` is then unspecified. Memory grows with the actual output, so a wrong length in a
 // file allocates nothing.
@@ -12,7 +12,10 @@
 
 namespace swiftlet {
 
-enum class Packing : std::uint8_t { kNone, kLz4, kZstd };
+enum class Packing : std::uint8_t { kNone, kLz4, kZstd, kBz2 };
+
+constexpr std::uint64_t kMostUnpacked = std::uint64_t{1}
+                                        << 30U;  // bytes per chunk; recorders make 1 to 4 MiB
 
 /// Decompresses all of `packed`; false unless the result has exactly `size` bytes.
 [[nodiscard]] bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t size,

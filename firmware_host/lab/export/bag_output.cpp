@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "drivers/bag/ros1_file.hpp"
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/files/new_folder.hpp"
 #include "firmware_host/files/whole_file.hpp"
