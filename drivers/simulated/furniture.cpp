@@ -126,12 +126,17 @@ void addMachine(World& world, const Place& place, const Eigen::Vector3d& size, s
                      0.13 * size.x(), 0.32 * size.z(), {Material::kChecker, Label::kMachine, seed + 3}, true);
 }
 
+Eigen::Vector3d drawVector(Random& random, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  Eigen::Vector3d drawn;
+  for (int i = 2; i >= 0; --i) drawn[i] = random.uniform(low[i], high[i]);
+  return drawn;
+}
+
 void addStack(World& world, const Place& place, double edge, int count, std::uint32_t seed) {
   Random random(seed, 31);
   Place at = place;
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d size(edge * random.uniform(0.8, 1.2), edge * random.uniform(0.7, 1.1),
-                               edge * random.uniform(0.5, 1.0));
+    const Eigen::Vector3d size = edge * drawVector(random, {0.8, 0.7, 0.5}, {1.2, 1.1, 1.0});
     at.yaw = place.yaw + random.uniform(-0.5, 0.5);
     addBox(world, at, size, {Material::kCarton, Label::kBox, seed + static_cast<std::uint32_t>(i) * 13});
     at.foot.z() += size.z();

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "drivers/simulated/world.hpp"
+#include "estimator/core/random.hpp"
 
 namespace swiftlet {
 
@@ -20,6 +21,11 @@ struct Place {
   Eigen::Vector3d foot = Eigen::Vector3d::Zero();
   double yaw = 0;
 };
+
+/// Uniform in a box; z is drawn first. In one expression the compiler would choose the order, and so the
+/// world.
+[[nodiscard]] Eigen::Vector3d drawVector(Random& random, const Eigen::Vector3d& low,
+                                         const Eigen::Vector3d& high);
 
 void addBox(World& world, const Place& place, const Eigen::Vector3d& size, const Finish& finish);
 /// The side towards +y (before the rotation) gets `front`, the others `finish`.

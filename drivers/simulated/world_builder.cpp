@@ -109,7 +109,9 @@ class Ground {
     for (int attempt = 0; attempt < kTries; ++attempt) {
       const double reach_x = 0.5 * size_.x() - radius - 0.02;
       const double reach_y = 0.5 * size_.y() - radius - 0.02;
-      Vector3d p(random.uniform(-reach_x, reach_x), random.uniform(-reach_y, reach_y), 0);
+      Vector3d p = Vector3d::Zero();
+      p.y() = random.uniform(-reach_y, reach_y);
+      p.x() = random.uniform(-reach_x, reach_x);
       double yaw = random.uniform(0.0, 2 * std::numbers::pi);
       if (at_wall) {
         const std::uint32_t side = random.below(4);
@@ -163,7 +165,8 @@ struct Furnishing {
 void putThings(World& world, Ground& ground, const Vector3d& size, const Furnishing& things, Random& random) {
   Place place;
   for (int i = 0; i < things.shelves; ++i) {
-    const Vector3d extent(random.uniform(0.9, 1.6), 0.35, std::min(random.uniform(1.4, 2.3), size.z() - 0.4));
+    const double height = std::min(random.uniform(1.4, 2.3), size.z() - 0.4);
+    const Vector3d extent(random.uniform(0.9, 1.6), 0.35, height);
     if (ground.find(random, 0.5 * extent.x(), extent.z(), true, place)) {
       // The place keeps a circle free of the wall; the shelf is moved back against it.
       const Vector3d back(std::sin(place.yaw), -std::cos(place.yaw), 0);
@@ -179,14 +182,15 @@ void putThings(World& world, Ground& ground, const Vector3d& size, const Furnish
     }
   }
   for (int i = 0; i < things.machines; ++i) {
-    const Vector3d extent(random.uniform(1.0, 2.0), random.uniform(0.8, 1.4), random.uniform(1.2, 2.4));
+    const Vector3d extent = drawVector(random, {1.0, 0.8, 1.2}, {2.0, 1.4, 2.4});
     if (ground.find(random, 0.5 * extent.head<2>().norm(), extent.z(), false, place)) {
       addMachine(world, place, extent, random.next());
     }
   }
   for (int i = 0; i < things.tables; ++i) {
-    const Vector3d extent(random.uniform(0.9, 1.5), random.uniform(0.6, 0.9), random.uniform(0.65, 0.85));
-    if (ground.find(random, 0.5 * extent.head<2>().norm(), extent.z() + 0.5, random.uniform() < 0.6, place)) {
+    const Vector3d extent = drawVector(random, {0.9, 0.6, 0.65}, {1.5, 0.9, 0.85});
+    const bool at_wall = random.uniform() < 0.6;
+    if (ground.find(random, 0.5 * extent.head<2>().norm(), extent.z() + 0.5, at_wall, place)) {
       const std::uint32_t seed = random.next();
       addTable(world, place, extent, seed);
       place.foot.z() += extent.z();
@@ -206,8 +210,9 @@ void putThings(World& world, Ground& ground, const Vector3d& size, const Furnish
   for (int i = 0; i < things.barrels; ++i) {
     const double radius = random.uniform(0.2, 0.32);
     if (ground.find(random, radius, 0.9, false, place)) {
+      const std::uint32_t seed = random.next();
       addUprightCylinder(world, place, radius, random.uniform(0.6, 0.9),
-                         {Material::kChecker, Label::kBarrel, random.next()}, true);
+                         {Material::kChecker, Label::kBarrel, seed}, true);
     }
   }
   for (int i = 0; i < things.balls; ++i) {
@@ -233,8 +238,8 @@ void layMats(World& world, const Vector3d& centre, const Vector3d& size, int cou
     const double a = random.uniform(0.5, 1.3);
     const double b = random.uniform(0.4, 1.0);
     const double yaw = random.uniform(0.0, 2 * std::numbers::pi);
-    const Vector3d at =
-        centre + Vector3d(random.uniform(-0.4, 0.4) * size.x(), random.uniform(-0.4, 0.4) * size.y(), 0.004);
+    const double aside = random.uniform(-0.4, 0.4) * size.y();
+    const Vector3d at = centre + Vector3d(random.uniform(-0.4, 0.4) * size.x(), aside, 0.004);
     const std::uint32_t seed = random.next();
     if (std::any_of(laid.begin(), laid.end(),
                     [&](const auto& other) { return (other - at.head<2>()).norm() < 1.7; })) {
@@ -385,7 +390,8 @@ void buildCorridor(World& world, const WorldSettings& settings) {
   const Vector3d centre = settings.floor_centre;
   addFloorAndCeiling(world, centre, size, Material::kCarpet, Material::kPlaster, random.next());
   for (const Wall& wall : roomWalls(centre, size)) {
-    addWall(world, wall, random.uniform() < 0.5 ? Material::kPlaster : Material::kBrick, random.next());
+    const std::uint32_t seed = random.next();
+    addWall(world, wall, random.uniform() < 0.5 ? Material::kPlaster : Material::kBrick, seed);
     hangPosters(world, wall, 0.7, random);
   }
   // The block in the middle, seen from outside: the walls of a room, reversed.
@@ -393,7 +399,8 @@ void buildCorridor(World& world, const WorldSettings& settings) {
   for (const Wall& inside : roomWalls(centre, core)) {
     const Wall wall{inside.corner + inside.length * inside.along, -inside.along, inside.length,
                     inside.height};
-    addWall(world, wall, random.uniform() < 0.5 ? Material::kConcrete : Material::kFabric, random.next());
+    const std::uint32_t seed = random.next();
+    addWall(world, wall, random.uniform() < 0.5 ? Material::kConcrete : Material::kFabric, seed);
     hangPosters(world, wall, 0.7, random);
   }
   const double rx = 0.5 * (kRingX - kPassage);
