@@ -56,6 +56,8 @@ void topicImage(std::string_view text) {
   const auto head = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   std::array<std::uint32_t, 3> sizes{};
   std::memcpy(sizes.data(), text.data() + 4, sizeof(sizes));
+  const int width = 1 + head(1);
+  const int height = 1 + head(2);
   TopicImage message;
   message.compressed = (head(0) & 1U) != 0;
   message.big_endian = (head(0) & 2U) != 0;
@@ -67,8 +69,6 @@ void topicImage(std::string_view text) {
   // Of its own memory, and no longer: reading beyond is seen.
   const std::vector<std::uint8_t> bytes(text.begin(), text.end());
   message.data = bytes;
-  const int width = 1 + head(1);
-  const int height = 1 + head(2);
   RawImage image;
   const DeviceFault fault = rawImageOf(message, width, height, image);
   demand(fault.ok() == !image.empty());
