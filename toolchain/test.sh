@@ -28,7 +28,7 @@ esac
 fuzz_seconds=15              # each fuzzer
 beyond='long|campaign|guide' # labels of what only --all runs
 # What reads bytes of others.
-parsers='drivers_calibration drivers_can drivers_image_decoder drivers_mavlink drivers_serial'
+parsers='drivers_bag drivers_calibration drivers_can drivers_image_decoder drivers_mavlink drivers_serial'
 # What shares memory between threads, the threads of devices, autopilot and viewers, and the whole executor on a second
 # of a log.
 threads='added_node autopilot core distance follower late_labels live realtime supervisor threaded view'
