@@ -206,34 +206,43 @@ TEST_CASE("Promoted landmarks teach nothing of position and yaw", "[smoother][ex
   settings.flight.aggressiveness = 1.6;
   const TrackFlight flight(settings);
   const FlightRecord plain = test::fly(flight, nullptr);
+  const auto informationAt = [](const FlightRecord& record, std::size_t k) {
+    const auto N = test::unobservable(record.x[k]);
+    return Eigen::Vector4d((N.transpose() * record.covariance[k].llt().solve(N)).diagonal());
+  };
+  const auto largestRise = [&](const FlightRecord& record) {
+    Eigen::Vector4d lowest = informationAt(record, 1);
+    double rise = 0;
+    for (std::size_t k = 2; k < record.x.size(); ++k) {
+      const Eigen::Vector4d now = informationAt(record, k);
+      rise = std::max(rise, now.cwiseQuotient(lowest).maxCoeff() - 1);
+      lowest = lowest.cwiseMin(now);
+    }
+    return rise;
+  };
+  const double plain_rise = largestRise(plain);
   for (const bool planes : {false, true}) {
     TieSettings tie_settings;
     tie_settings.planes = planes;
     tie_settings.directions = planes;
     PlaneTies ties(flight, tie_settings);
     const FlightRecord record = test::fly(flight, &ties);
-    Eigen::Vector4d lowest = Eigen::Vector4d::Constant(1e30);
-    Eigen::Vector4d first;
-    Eigen::Vector4d last;
-    double rise = 0;
+    const double rise = largestRise(record);
+    const Eigen::Vector4d first = informationAt(record, 1);
+    const Eigen::Vector4d last = informationAt(record, record.x.size() - 1);
+    constexpr std::size_t kSettled = 100;  // frames: 5 s
     double ratio = 1e30;
-    for (std::size_t k = 1; k < record.x.size(); ++k) {
-      const auto information = [k](const FlightRecord& r) {
-        const auto N = test::unobservable(r.x[k]);
-        return Eigen::Vector4d((N.transpose() * r.covariance[k].llt().solve(N)).diagonal());
-      };
-      last = information(record);
-      rise = std::max(rise, (last.cwiseQuotient(lowest)).maxCoeff() - 1);
-      lowest = lowest.cwiseMin(last);
-      if (k == 1) first = last;
-      if (k > 100) ratio = std::min(ratio, information(plain).cwiseQuotient(last).minCoeff());
+    for (std::size_t k = kSettled + 1; k < record.x.size(); ++k) {
+      ratio = std::min(ratio, informationAt(plain, k).cwiseQuotient(informationAt(record, k)).minCoeff());
     }
     std::printf(
-        "%s: x, y, z, yaw after 20 s %.3g %.3g %.3g %.3g of the start's; largest rise %.2g; structureless "
-        "over explicit at least %.2g\n",
+        "%s: x, y, z, yaw after 20 s %.3g %.3g %.3g %.3g of the start's; largest rise %.2g (structureless "
+        "%.2g); structureless over explicit at least %.2g\n",
         planes ? "planes" : "promoted", last[0] / first[0], last[1] / first[1], last[2] / first[2],
-        last[3] / first[3], rise, ratio);
-    CHECK(rise < 0.05);
+        last[3] / first[3], rise, plain_rise, ratio);
+    // A landmark found again restores a little of what was lost, and explicit ones are kept longer.
+    CHECK(rise < plain_rise + 0.05);
+    CHECK(ratio > 0.85);
     for (int axis = 0; axis < 4; ++axis) CHECK(last[axis] < 0.5 * first[axis]);
   }
 }
