@@ -342,6 +342,7 @@ void buildTwinRooms(World& world, const WorldSettings& settings, const std::vect
     things = scaled(things, settings.clutter);
     layMats(world, centre, size, things.mats, random);
     std::vector<Vector3d> here;
+    here.reserve(local.size());
     for (const Vector3d& p : local) here.push_back(p + centre);
     Ground ground(centre, size, here);
     putThings(world, ground, size, things, random);

@@ -206,34 +206,34 @@ TEST_CASE("Promoted landmarks teach nothing of position and yaw", "[smoother][ex
   settings.flight.aggressiveness = 1.6;
   const TrackFlight flight(settings);
   const FlightRecord plain = test::fly(flight, nullptr);
-  const auto informationAt = [](const FlightRecord& record, std::size_t k) {
+  const auto information_at = [](const FlightRecord& record, std::size_t k) {
     const auto N = test::unobservable(record.x[k]);
     return Eigen::Vector4d((N.transpose() * record.covariance[k].llt().solve(N)).diagonal());
   };
-  const auto largestRise = [&](const FlightRecord& record) {
-    Eigen::Vector4d lowest = informationAt(record, 1);
+  const auto largest_rise = [&](const FlightRecord& record) {
+    Eigen::Vector4d lowest = information_at(record, 1);
     double rise = 0;
     for (std::size_t k = 2; k < record.x.size(); ++k) {
-      const Eigen::Vector4d now = informationAt(record, k);
+      const Eigen::Vector4d now = information_at(record, k);
       rise = std::max(rise, now.cwiseQuotient(lowest).maxCoeff() - 1);
       lowest = lowest.cwiseMin(now);
     }
     return rise;
   };
-  const double plain_rise = largestRise(plain);
+  const double plain_rise = largest_rise(plain);
   for (const bool planes : {false, true}) {
     TieSettings tie_settings;
     tie_settings.planes = planes;
     tie_settings.directions = planes;
     PlaneTies ties(flight, tie_settings);
     const FlightRecord record = test::fly(flight, &ties);
-    const double rise = largestRise(record);
-    const Eigen::Vector4d first = informationAt(record, 1);
-    const Eigen::Vector4d last = informationAt(record, record.x.size() - 1);
+    const double rise = largest_rise(record);
+    const Eigen::Vector4d first = information_at(record, 1);
+    const Eigen::Vector4d last = information_at(record, record.x.size() - 1);
     constexpr std::size_t kSettled = 100;  // frames: 5 s
     double ratio = 1e30;
     for (std::size_t k = kSettled + 1; k < record.x.size(); ++k) {
-      ratio = std::min(ratio, informationAt(plain, k).cwiseQuotient(informationAt(record, k)).minCoeff());
+      ratio = std::min(ratio, information_at(plain, k).cwiseQuotient(information_at(record, k)).minCoeff());
     }
     std::printf(
         "%s: x, y, z, yaw after 20 s %.3g %.3g %.3g %.3g of the start's; largest rise %.2g (structureless "

@@ -123,15 +123,15 @@ TEST_CASE("ROS 1 bags that cannot be read are refused with the reason", "[ros1_b
   const std::string file = folder.file("a.bag");
   test::write(*makeRos1Writer(file), someMessages(6, 20));
   const std::vector<std::uint8_t> whole = test::bytesOf(file);
-  const auto refusalWith = [&](std::string_view text, std::string_view other) {
+  const auto refusal_with = [&](std::string_view text, std::string_view other) {
     std::vector<std::uint8_t> bytes = whole;
     std::copy(other.begin(), other.end(), bytes.begin() + static_cast<std::ptrdiff_t>(placeOf(bytes, text)));
     test::writeBytes(file, bytes);
     return refusalOf([&] { (void)openBag(file); });
   };
-  CHECK(refusalWith("compression=none", "compression=zstd").message.find("`zstd`") != std::string::npos);
-  CHECK(refusalWith("conn_count=", "encryptor=x").message.find("encrypted with x") != std::string::npos);
-  CHECK(refusalWith("ver=\x01", "ver=\x02").message == "a chunk's index is damaged");
+  CHECK(refusal_with("compression=none", "compression=zstd").message.find("`zstd`") != std::string::npos);
+  CHECK(refusal_with("conn_count=", "encryptor=x").message.find("encrypted with x") != std::string::npos);
+  CHECK(refusal_with("ver=\x01", "ver=\x02").message == "a chunk's index is damaged");
   std::vector<std::uint8_t> bytes = whole;
   putNumber(bytes, bytes.size() - 4, 5);  // the tail's last count
   test::writeBytes(file, bytes);

@@ -195,11 +195,11 @@ TEST_CASE("the writer's bytes are those of rosbag", "[ros_bag]") {
   }
   bag.close();
   writer->finish();
-  const auto bytesOf = [](const std::string& path) {
+  const auto bytes_of = [](const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(file), {});
   };
-  const bool same = bytesOf(theirs) == bytesOf(ours);
+  const bool same = bytes_of(theirs) == bytes_of(ours);
   CHECK(same);
 }
 
