@@ -12,14 +12,16 @@
 #include "firmware_host/schedule/lockstep.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/logs/silent_listener.hpp"
+#include "tests/sanitized.hpp"
 
 namespace swiftlet {
 namespace {
 
 constexpr Duration kFramePeriod = Duration::fromMilliseconds(50);
-constexpr Duration kSamplePatience = Duration::fromMilliseconds(60);
+constexpr int kSlower = kSanitized ? 10 : 1;
+constexpr Duration kSamplePatience = Duration::fromMilliseconds(60 * kSlower);
 /// No step takes as long; the governor's allowance for a frame's age is shorter than kSamplePatience.
-constexpr double kStepBudget = 10, kAgeBudget = 0.05;  // s
+constexpr double kStepBudget = 10, kAgeBudget = 0.05 * kSlower;  // s
 
 /// Full effort, and what a stage said of its steps.
 class NotedSteps : public EffortSource {

@@ -26,6 +26,7 @@ using test::soon;
 class ToldCamera : public CameraSource {
  public:
   std::atomic<const char*> format{"GREY"};
+  std::atomic<const char*> opened{nullptr};  ///< format with which it opened last
   std::atomic<bool> goes{false};
   bool of_library = false;
 
@@ -33,9 +34,11 @@ class ToldCamera : public CameraSource {
     goes.store(false);
     open_ = true;
     facts_ = {};
-    facts_.format = *pixelFormat(format.load());
+    const char* const name = format.load();
+    facts_.format = *pixelFormat(name);
     facts_.width = 64;
     facts_.height = 48;
+    opened.store(name);
     return {};
   }
   void close() override { open_ = false; }
@@ -93,10 +96,12 @@ TEST_CASE("a camera that comes back with other pixels is refused until it has th
   camera.format = "YUYV";
   camera.goes = true;
   CHECK(soon([&] { return said("reopened with 64x48 YUYV instead of 64x48 GREY"); }));
-  camera.format = "GREY";
-  CHECK(soon([&] { return !camera.goes.load() && camera.facts().format == kGrey8; }));
+  const char* const grey = "GREY";
+  camera.format = grey;
+  CHECK(soon([&] { return camera.opened.load() == grey; }));
   stop.store(true);
   runner.join();
+  CHECK(camera.facts().format == kGrey8);
 }
 
 /// Gives small images, each of another grey.
