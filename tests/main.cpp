@@ -19,13 +19,6 @@ void skipCase(const std::string& reason, const std::string& command) {
 
 }  // namespace swiftlet
 
-#if defined(__SANITIZE_THREAD__)
-/// The locks of GLib are bare calls of the kernel, which the sanitizer does not know.
-extern "C" const char* __tsan_default_suppressions() {  // NOLINT(bugprone-reserved-identifier): its name
-  return "called_from_lib:libglib-2.0.so\ncalled_from_lib:libgstreamer-1.0.so\n";
-}
-#endif
-
 int main(int argc, char** argv) {
   // Catch2 returns the number of failures: 77 of them would be taken for a skipped test.
   if (Catch::Session().run(argc, argv) != 0) return 1;

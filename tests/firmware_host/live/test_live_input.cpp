@@ -192,7 +192,7 @@ TEST_CASE("a pipeline stands in for a video node, and never beside one") {
   CHECK(refusal(settings, mono()).empty());
 }
 
-TEST_CASE("pipelines run below the flight path, or say that this build has none") {
+TEST_CASE("pipelines run below the flight path, or say that this build has none", "[glib]") {
   Settings settings = vehicle();
   settings.cameras.device0.clear();
   settings.cameras.device1.clear();
