@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <map>
 
-#include "drivers/bag/chunk_cache.hpp"
-#include "drivers/bag/file_bytes.hpp"
+#include "drivers/bag/chunked_bag.hpp"
 #include "drivers/bag/mcap_records.hpp"
-#include "drivers/bag/unpack.hpp"
 #include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/input/stamp_range.hpp"
@@ -29,7 +27,7 @@ BagEncoding encodingOf(std::string_view message_encoding) {
   return message_encoding == "ros1" ? BagEncoding::kRos1 : BagEncoding::kOther;
 }
 
-class McapFile final : public BagFile {
+class McapFile final : public ChunkedBag {
  public:
   McapFile(const std::string& path, const std::string& name);
   Bytes read(const BagEntry& entry) override;
@@ -46,35 +44,22 @@ class McapFile final : public BagFile {
     std::uint32_t index = 0;  ///< of the topic
     bool operator==(const Channel&) const = default;
   };
-  struct Chunk {
-    std::uint64_t record = 0;  ///< byte where its record begins
-    std::uint64_t data = 0;    ///< byte where its compressed records begin
-    std::uint64_t packed = 0;
-    std::uint64_t unpacked = 0;
-    std::uint32_t crc = 0;  ///< 0: no checksum
-    Packing packing = Packing::kNone;
-  };
-
-  [[noreturn]] void fail(std::uint64_t at, const std::string& what) const;
   void findEnd();
   void readSummary();
   void walk();
   /// Takes the record at `at` and moves there to the next; false: it was the last.
   bool takeRecord(std::uint64_t& at);
-  void endEarly(std::uint64_t at);
+  void endData(std::uint64_t at);
   void checkData(std::uint64_t data_end, std::uint32_t crc);
   void takeSchema(Bytes content, std::uint64_t place);
   void takeChannel(Bytes content, std::uint64_t place);
   void takeStatistics(Bytes content, std::uint64_t place);
   void takeChunk(std::uint64_t record, std::uint64_t content, std::uint64_t length);
   void takeIndex(Bytes content, std::uint64_t place);
-  void closeChunk();
-  void scanChunk(std::uint32_t chunk, bool messages);
+  void scanChunk(std::uint32_t chunk, bool messages) override;
   void takeMessage(Bytes head, std::uint32_t part, std::uint64_t at, std::uint64_t place);
   [[nodiscard]] Stamp stampOf(std::uint64_t ns, std::uint32_t topic, std::uint64_t place) const;
-  Bytes unpackedChunk(std::uint32_t chunk);
 
-  FileBytes file_;
   bool finished_ = false;      ///< footer and magic are present at the end
   bool zero_tail_ = false;     ///< zeros are present at the end, as after a power cut
   std::uint64_t footer_ = 0;   ///< byte where the footer begins
@@ -84,15 +69,11 @@ class McapFile final : public BagFile {
   bool outside_ = false;       ///< some messages are outside of chunks
   std::map<std::uint16_t, Schema> schemas_;
   std::map<std::uint16_t, Channel> channels_;
-  std::vector<Chunk> chunks_;
-  std::size_t before_chunk_ = 0;  ///< number of entries before those of the newest chunk
-  bool chunk_open_ = false;       ///< further indexes of the newest chunk may follow
-  ChunkCache cache_;
-  std::vector<std::uint8_t> packed_;
   std::vector<std::uint8_t> message_;  ///< decompressed
 };
 
-McapFile::McapFile(const std::string& path, const std::string& name) : BagFile(name), file_(path, name) {
+McapFile::McapFile(const std::string& path, const std::string& name)
+    : ChunkedBag(path, name, "mcap recover") {
   const Bytes magic = file_.at(0, mcap::kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), mcap::kMagic.begin(), mcap::kMagic.end())) {
     fail(0, "is not an MCAP file");
@@ -104,11 +85,6 @@ McapFile::McapFile(const std::string& path, const std::string& name) : BagFile(n
     fail(summary_, fmt::format("its statistics count {} messages, but it holds {}", count_, entries_.size()));
   }
   orderEntries();
-}
-
-void McapFile::fail(std::uint64_t at, const std::string& what) const {
-  throw InputError(path_, 0, fmt::format("byte {}", at), what,
-                   "The file is damaged: copy it again, or recover the intact part with `mcap recover`");
 }
 
 void McapFile::findEnd() {
@@ -195,22 +171,9 @@ void McapFile::takeStatistics(Bytes content, std::uint64_t place) {
   counted_ = true;
 }
 
-void McapFile::endEarly(std::uint64_t at) {
+void McapFile::endData(std::uint64_t at) {
   if (finished_) fail(at, "a record extends past the data");
-  // Some indexes of the newest chunk may be missing: read its records instead. After a power cut its end may
-  // be zeros; then none of it is used.
-  if (chunk_open_) {
-    entries_.resize(before_chunk_);
-    try {
-      scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
-    } catch (const InputError&) {
-      entries_.resize(before_chunk_);
-      at = chunks_.back().record;
-    }
-  }
-  warnings_.push_back(fmt::format(
-      "{}: not closed by its recorder, or truncated: {} messages up to byte {} are intact and are read",
-      path_, entries_.size(), at));
+  endEarly(at);
 }
 
 void McapFile::walk() {
@@ -220,7 +183,7 @@ void McapFile::walk() {
     }
   } catch (const InputError&) {
     if (!zero_tail_) throw;
-    endEarly(at);
+    endData(at);
   }
 }
 
@@ -234,11 +197,11 @@ bool McapFile::takeRecord(std::uint64_t& at) {
   // No record is of kind 0. The data is complete only in a finished file.
   const bool ends = (op == Op{} && zero_tail_) || (op == Op::kDataEnd && !finished_);
   if (!reader.ok() || content > end || length > end - content || ends) {
-    endEarly(at);
+    endData(at);
     return false;
   }
   const auto small = static_cast<std::size_t>(length);
-  if (op != Op::kMessageIndex && chunk_open_) closeChunk();
+  if (op != Op::kMessageIndex) closeChunk();
   switch (op) {
     case Op::kSchema:
       takeSchema(file_.at(content, small), at);
@@ -248,7 +211,7 @@ bool McapFile::takeRecord(std::uint64_t& at) {
       break;
     case Op::kMessage:
       outside_ = true;
-      takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), ChunkCache::kNone, at, at);
+      takeMessage(file_.at(content, std::min(small, mcap::kMessageHead)), kNoChunk, at, at);
       break;
     case Op::kChunk:
       takeChunk(at, content, length);
@@ -301,17 +264,7 @@ void McapFile::takeChunk(std::uint64_t record, std::uint64_t content, std::uint6
   } else if (!packing.empty()) {
     fail(record, fmt::format("a chunk is compressed with `{}`, which is neither zstd nor lz4", packing));
   }
-  if (chunk.unpacked > kMostUnpacked)
-    fail(record, fmt::format("a chunk of {} bytes is too large", chunk.unpacked));
-  before_chunk_ = entries_.size();
-  chunk_open_ = true;
-  chunks_.push_back(chunk);
-}
-
-/// Reads the records of a chunk that has no index.
-void McapFile::closeChunk() {
-  if (entries_.size() == before_chunk_) scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
-  chunk_open_ = false;
+  beginChunk(chunk);
 }
 
 void McapFile::takeIndex(Bytes content, std::uint64_t place) {
@@ -319,11 +272,11 @@ void McapFile::takeIndex(Bytes content, std::uint64_t place) {
   const std::uint16_t channel = reader.u16();
   const std::uint32_t bytes = reader.u32();
   constexpr std::size_t kEntry = 16;
-  if (!reader.ok() || !chunk_open_ || bytes != reader.left() || bytes % kEntry != 0) {
+  if (!reader.ok() || !chunkIsOpen() || bytes != reader.left() || bytes % kEntry != 0) {
     fail(place, "a message index is damaged");
   }
   if (bytes == 0) return;
-  const auto chunk = static_cast<std::uint32_t>(chunks_.size() - 1);
+  const std::uint32_t chunk = newestChunk();
   if (!channels_.contains(channel)) scanChunk(chunk, false);
   const auto known = channels_.find(channel);
   if (known == channels_.end()) {
@@ -371,22 +324,10 @@ void McapFile::scanChunk(std::uint32_t chunk, bool messages) {
   }
 }
 
-Bytes McapFile::unpackedChunk(std::uint32_t index) {
-  const Chunk& chunk = chunks_[index];
-  return cache_.at(index, [&](std::vector<std::uint8_t>& out) {
-    file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), packed_);
-    if (packed_.size() != chunk.packed ||
-        !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), out)) {
-      fail(chunk.record, "a chunk cannot be decompressed");
-    }
-    if (chunk.crc != 0 && crcOf(0, out) != chunk.crc) fail(chunk.record, "a chunk's checksum is wrong");
-  });
-}
-
 Bytes McapFile::read(const BagEntry& entry) {
   Bytes record;
   std::uint64_t place = entry.at;
-  if (entry.part == ChunkCache::kNone) {
+  if (entry.part == kNoChunk) {
     const std::uint64_t length = LittleFieldReader(file_.at(entry.at + 1, sizeof(std::uint64_t))).u64();
     file_.read(entry.at, static_cast<std::size_t>(mcap::kRecordHead + length), packed_);
     record = packed_;

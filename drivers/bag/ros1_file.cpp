@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <map>
 
-#include "drivers/bag/chunk_cache.hpp"
-#include "drivers/bag/file_bytes.hpp"
+#include "drivers/bag/chunked_bag.hpp"
 #include "drivers/bag/ros1_records.hpp"
-#include "drivers/bag/unpack.hpp"
+#include "drivers/bag/ros_messages.hpp"
 #include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
@@ -19,26 +18,16 @@ constexpr std::uint32_t kMostHeader = std::uint32_t{1} << 16U;  // bytes; the lo
 constexpr std::size_t kIndexEntry = 12;                         // bytes: time and offset
 
 Stamp readTime(LittleFieldReader& reader) {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
   const std::int64_t seconds = reader.u32();
-  return Stamp{seconds * kNsPerSecond + reader.u32()};
+  return Stamp{seconds * rosmsg::kNsPerSecond + reader.u32()};
 }
 
-class File final : public BagFile {
+class File final : public ChunkedBag {
  public:
   File(const std::string& path, const std::string& name);
   Bytes read(const BagEntry& entry) override;
 
  private:
-  struct Chunk {
-    std::uint64_t record = 0;  ///< byte where its record begins
-    std::uint64_t data = 0;    ///< byte where its compressed records begin
-    std::uint32_t packed = 0;
-    std::uint32_t unpacked = 0;
-    Packing packing = Packing::kNone;
-  };
-
-  [[noreturn]] void fail(std::uint64_t at, const std::string& what) const;
   /// Number in the header of the record at `place`.
   std::uint32_t numberOf(Bytes header, const char* name, std::uint64_t place) const;
   /// Its bytes are valid until the next call to file_.at().
@@ -51,25 +40,16 @@ class File final : public BagFile {
   void takeChunk(const Head& head, std::uint64_t at);
   void takeIndex(const Head& head, std::uint64_t at);
   BagEntry entryOf(Bytes header, std::uint32_t part, std::uint64_t at, std::uint64_t place) const;
-  void closeChunk();
-  void scanChunk(std::uint32_t chunk, bool messages);
-  void endEarly(std::uint64_t at);
-  Bytes unpackedChunk(std::uint32_t chunk);
+  void scanChunk(std::uint32_t chunk, bool messages) override;
 
-  FileBytes file_;
   std::uint64_t data_end_ = 0;  ///< byte where the tail begins; the file's end if it was not closed
   bool finished_ = false;       ///< the tail is complete
   std::uint32_t chunk_count_ = 0;
   std::uint64_t count_ = 0;                             ///< number of messages by the tail
   std::map<std::uint32_t, std::uint32_t> connections_;  ///< indexes of topics
-  std::vector<Chunk> chunks_;
-  std::size_t before_chunk_ = 0;  ///< number of entries before those of the newest chunk
-  bool chunk_open_ = false;       ///< further indexes of the newest chunk may follow
-  ChunkCache cache_;
-  std::vector<std::uint8_t> packed_;
 };
 
-File::File(const std::string& path, const std::string& name) : BagFile(name), file_(path, name) {
+File::File(const std::string& path, const std::string& name) : ChunkedBag(path, name, "rosbag reindex") {
   readBagRecord();
   if (finished_) readTail();
   walk();
@@ -77,11 +57,6 @@ File::File(const std::string& path, const std::string& name) : BagFile(name), fi
     fail(data_end_, fmt::format("it counts {} messages, but holds {}", count_, entries_.size()));
   }
   orderEntries();
-}
-
-void File::fail(std::uint64_t at, const std::string& what) const {
-  throw InputError(path_, 0, fmt::format("byte {}", at), what,
-                   "The file is damaged: copy it again, or recover the intact part with `rosbag reindex`");
 }
 
 std::uint32_t File::numberOf(Bytes header, const char* name, std::uint64_t place) const {
@@ -151,31 +126,15 @@ void File::walk() {
       takeRecord(head, at);
       at = next;
     }
-    if (finished_ && chunk_open_) closeChunk();
+    if (finished_) closeChunk();
   } catch (const InputError&) {
     if (finished_) throw;
   }
   if (!finished_) endEarly(at);
 }
 
-void File::endEarly(std::uint64_t at) {
-  // Some indexes of the newest chunk may be missing: read its records instead.
-  if (chunk_open_) {
-    entries_.resize(before_chunk_);
-    try {
-      scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
-    } catch (const InputError&) {
-      entries_.resize(before_chunk_);
-      at = chunks_.back().record;
-    }
-  }
-  warnings_.push_back(fmt::format(
-      "{}: not closed by its recorder, or truncated: {} messages up to byte {} are intact and are read",
-      path_, entries_.size(), at));
-}
-
 void File::takeRecord(const Head& head, std::uint64_t at) {
-  if (head.op != Op::kIndex && chunk_open_) closeChunk();
+  if (head.op != Op::kIndex) closeChunk();
   switch (head.op) {
     case Op::kConnection: {
       const Bytes record = file_.at(at, head.size + head.length);
@@ -189,7 +148,7 @@ void File::takeRecord(const Head& head, std::uint64_t at) {
       takeIndex(head, at);
       break;
     case Op::kMessage:  // of a chunk that was being written when the recorder ended
-      entries_.push_back(entryOf(head.header, ChunkCache::kNone, at, at));
+      entries_.push_back(entryOf(head.header, kNoChunk, at, at));
       break;
     default:
       break;
@@ -225,27 +184,17 @@ void File::takeChunk(const Head& head, std::uint64_t at) {
   } else if (packing != "none") {
     fail(at, fmt::format("a chunk is compressed with `{}`, which is none of none, bz2 and lz4", packing));
   }
-  if (chunk.unpacked > kMostUnpacked)
-    fail(at, fmt::format("a chunk of {} bytes is too large", chunk.unpacked));
-  before_chunk_ = entries_.size();
-  chunk_open_ = true;
-  chunks_.push_back(chunk);
-}
-
-/// Reads the records of a chunk that has no index.
-void File::closeChunk() {
-  if (entries_.size() == before_chunk_) scanChunk(static_cast<std::uint32_t>(chunks_.size() - 1), true);
-  chunk_open_ = false;
+  beginChunk(chunk);
 }
 
 void File::takeIndex(const Head& head, std::uint64_t at) {
   const std::uint32_t connection = numberOf(head.header, "conn", at);
   const bool known_version = numberOf(head.header, "ver", at) == kIndexVersion;
   const std::uint64_t count = numberOf(head.header, "count", at);
-  if (!known_version || !chunk_open_ || count * kIndexEntry != head.length)
+  if (!known_version || !chunkIsOpen() || count * kIndexEntry != head.length)
     fail(at, "a chunk's index is damaged");
   if (count == 0) return;
-  const auto chunk = static_cast<std::uint32_t>(chunks_.size() - 1);
+  const std::uint32_t chunk = newestChunk();
   if (!connections_.contains(connection)) scanChunk(chunk, false);
   const auto known = connections_.find(connection);
   if (known == connections_.end()) {
@@ -287,20 +236,10 @@ void File::scanChunk(std::uint32_t chunk, bool messages) {
   }
 }
 
-Bytes File::unpackedChunk(std::uint32_t index) {
-  const Chunk& chunk = chunks_[index];
-  return cache_.at(index, [&](std::vector<std::uint8_t>& out) {
-    file_.read(chunk.data, chunk.packed, packed_);
-    if (packed_.size() != chunk.packed || !unpack(chunk.packing, packed_, chunk.unpacked, out)) {
-      fail(chunk.record, "a chunk cannot be decompressed");
-    }
-  });
-}
-
 Bytes File::read(const BagEntry& entry) {
   Bytes records;
   std::uint64_t place = entry.at;
-  if (entry.part == ChunkCache::kNone) {
+  if (entry.part == kNoChunk) {
     const Head head = headAt(entry.at, data_end_);
     file_.read(entry.at, head.size + head.length, packed_);
     records = packed_;

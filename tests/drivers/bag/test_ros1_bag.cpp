@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "drivers/device/byte_fields.hpp"
 #include "tests/drivers/bag/bag_fixture.hpp"
 
 namespace swiftlet {
@@ -25,14 +26,11 @@ std::size_t placeOf(const std::vector<std::uint8_t>& bytes, std::string_view tex
 }
 
 void putNumber(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t number) {
-  for (std::size_t i = 0; i < sizeof(number); ++i)
-    bytes[at + i] = static_cast<std::uint8_t>(number >> (8 * i));
+  LittleFieldWriter(std::span(bytes).subspan(at)).u32(number);
 }
 
 std::uint32_t numberAt(const std::vector<std::uint8_t>& bytes, std::size_t at) {
-  std::uint32_t number = 0;
-  for (std::size_t i = 0; i < sizeof(number); ++i) number |= std::uint32_t{bytes[at + i]} << (8 * i);
-  return number;
+  return LittleFieldReader(std::span(bytes).subspan(at)).u32();
 }
 
 TEST_CASE("a ROS 1 bag gives back what was written, over many chunks", "[ros1_bag]") {

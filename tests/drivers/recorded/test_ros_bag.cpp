@@ -4,12 +4,11 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 
 #include "drivers/bag/bag_writer.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
 #include "tests/drivers/recorded/ros_bodies.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::test {
 
@@ -195,11 +194,7 @@ TEST_CASE("the writer's bytes are those of rosbag", "[ros_bag]") {
   }
   bag.close();
   writer->finish();
-  const auto bytes_of = [](const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return std::string(std::istreambuf_iterator<char>(file), {});
-  };
-  const bool same = bytes_of(theirs) == bytes_of(ours);
+  const bool same = test::textOf(theirs) == test::textOf(ours);
   CHECK(same);
 }
 
