@@ -1,20 +1,14 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <vector>
 
 #include "drivers/bag/bag_writer.hpp"
+#include "drivers/bag/byte_buffer.hpp"
 #include "drivers/bag/mcap_records.hpp"
+#include "drivers/bag/output_file.hpp"
 #include "drivers/bag/qos_text.hpp"
 #include "drivers/bag/unpack.hpp"
-#include "drivers/input/input_error.hpp"
 
 namespace swiftlet {
 namespace {
@@ -27,46 +21,25 @@ constexpr std::size_t kChunkBytes = std::size_t{1}
                                     << 20U;  // as in rosbag2: holds some images, or seconds of IMU
 
 /// A buffer of consecutive records.
-class Records {
+class Records : public ByteBuffer {
  public:
   template <typename Fill>
   void add(Op op, Fill&& fill) {
     u8(static_cast<std::uint8_t>(op));
-    const std::size_t length = bytes_.size();
+    const std::size_t length = size();
     u64(0);
     fill(*this);
-    const std::uint64_t content = bytes_.size() - length - sizeof(std::uint64_t);
-    std::memcpy(bytes_.data() + length, &content, sizeof(content));
+    setU64(length, size() - length - sizeof(std::uint64_t));
   }
-  void u8(std::uint8_t value) { put(value); }
-  void u16(std::uint16_t value) { put(value); }
-  void u32(std::uint32_t value) { put(value); }
-  void u64(std::uint64_t value) { put(value); }
   void text(std::string_view text) {
     u32(static_cast<std::uint32_t>(text.size()));
-    bytes_.insert(bytes_.end(), text.begin(), text.end());
+    copy({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   }
-  void copy(Bytes bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
-  void clear() { bytes_.clear(); }
-  [[nodiscard]] std::size_t size() const { return bytes_.size(); }
-  [[nodiscard]] Bytes bytes() const { return bytes_; }
-
- private:
-  template <typename T>
-  void put(T value) {
-    static_assert(std::endian::native == std::endian::little, "numbers are copied as they are");
-    const auto word = std::bit_cast<std::array<std::uint8_t, sizeof(T)>>(value);
-    bytes_.insert(bytes_.end(), word.begin(), word.end());
-  }
-
-  std::vector<std::uint8_t> bytes_;
 };
 
 class McapWriter final : public BagWriter {
  public:
-  McapWriter(const std::string& path, McapPacking packing)
-      : BagWriter(path), packing_(packing), file_(std::fopen(path.c_str(), "wbe")) {
-    if (!file_) fail();
+  McapWriter(const std::string& path, McapPacking packing) : BagWriter(path), packing_(packing), file_(path) {
     write(mcap::kMagic);
     records_.add(Op::kHeader, [](Records& r) {
       r.text("ros2");
@@ -116,27 +89,18 @@ class McapWriter final : public BagWriter {
     flushRecords();
     writeSummary();
     write(mcap::kMagic);
-    if (std::fclose(file_.release()) != 0) fail();
+    file_.close();
   }
 
  private:
-  struct FileCloser {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   struct Channel {
     Records index;  ///< of the chunk being filled
     std::uint64_t messages = 0;
   };
 
-  [[noreturn]] void fail() const {
-    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Check that the folder exists and is writable and the disk is not full");
-  }
-
   void write(Bytes bytes) {
-    if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail();
+    file_.write(bytes);
     crc_ = crcOf(crc_, bytes);
-    at_ += bytes.size();
   }
   void flushRecords() {
     write(records_.bytes());
@@ -172,7 +136,7 @@ class McapWriter final : public BagWriter {
     const bool smaller = !packed.empty() && packed.size() < chunk_.size();
     const Bytes data = smaller ? Bytes(packed) : chunk_.bytes();
     const char* name = smaller ? "zstd" : "";
-    const std::uint64_t begin = at_;
+    const std::uint64_t begin = file_.size();
     records_.add(Op::kChunk, [&](Records& r) {
       r.u64(chunk_first_);
       r.u64(chunk_last_);
@@ -183,13 +147,13 @@ class McapWriter final : public BagWriter {
       r.copy(data);
     });
     flushRecords();
-    const std::uint64_t length = at_ - begin;
+    const std::uint64_t length = file_.size() - begin;
     Records offsets;
     for (std::size_t id = 0; id < channels_.size(); ++id) {
       Records& index = channels_[id].index;
       if (index.size() == 0) continue;
       offsets.u16(static_cast<std::uint16_t>(id));
-      offsets.u64(at_ + records_.size());
+      offsets.u64(file_.size() + records_.size());
       records_.add(Op::kMessageIndex, [&](Records& r) {
         r.u16(static_cast<std::uint16_t>(id));
         r.u32(static_cast<std::uint32_t>(index.size()));
@@ -223,7 +187,7 @@ class McapWriter final : public BagWriter {
   }
 
   void writeSummary() {
-    const std::uint64_t begin = at_;
+    const std::uint64_t begin = file_.size();
     crc_ = 0;
     write(summary_.bytes());
     records_.add(Op::kStatistics, [this](Records& r) {
@@ -254,8 +218,7 @@ class McapWriter final : public BagWriter {
   }
 
   McapPacking packing_;
-  std::unique_ptr<std::FILE, FileCloser> file_;
-  std::uint64_t at_ = 0;   ///< bytes written
+  OutputFile file_;
   std::uint32_t crc_ = 0;  ///< of the data, later of the summary
   Records records_;        ///< waiting to be written
   Records chunk_;          ///< being filled

@@ -1,14 +1,11 @@
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <map>
 #include <vector>
 
 #include "drivers/bag/bag_writer.hpp"
+#include "drivers/bag/byte_buffer.hpp"
+#include "drivers/bag/output_file.hpp"
 #include "drivers/bag/ros1_records.hpp"
-#include "drivers/input/input_error.hpp"
+#include "drivers/bag/ros_messages.hpp"
 
 namespace swiftlet {
 namespace ros1 {
@@ -21,26 +18,17 @@ Bytes bytesOf(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-/// Numbers, texts and records, one after the other.
-class Buffer {
+/// Fields of a header, or records.
+class Buffer : public ByteBuffer {
  public:
-  Buffer& u8(std::uint8_t value) { return put<1>(value); }
-  Buffer& u32(std::uint32_t value) { return put<4>(value); }
-  Buffer& u64(std::uint64_t value) { return put<8>(value); }
   /// Seconds and nanoseconds.
-  Buffer& time(Stamp stamp) {
-    constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-    return u32(static_cast<std::uint32_t>(stamp.ns / kNsPerSecond))
-        .u32(static_cast<std::uint32_t>(stamp.ns % kNsPerSecond));
+  ByteBuffer& time(Stamp stamp) {
+    return u32(static_cast<std::uint32_t>(stamp.ns / rosmsg::kNsPerSecond))
+        .u32(static_cast<std::uint32_t>(stamp.ns % rosmsg::kNsPerSecond));
   }
-  Buffer& copy(Bytes bytes) {
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-    return *this;
-  }
-  /// A field of a header.
   Buffer& field(std::string_view name, Bytes value) {
-    u32(static_cast<std::uint32_t>(name.size() + 1 + value.size())).copy(bytesOf(name)).u8('=');
-    return copy(value);
+    u32(static_cast<std::uint32_t>(name.size() + 1 + value.size())).copy(bytesOf(name)).u8('=').copy(value);
+    return *this;
   }
   Buffer& field(std::string_view name, std::string_view value) { return field(name, bytesOf(value)); }
   Buffer& field(std::string_view name, std::uint32_t value) {
@@ -53,27 +41,14 @@ class Buffer {
     u32(static_cast<std::uint32_t>(header.size())).copy(header.bytes());
     u32(static_cast<std::uint32_t>(data.size())).copy(data);
   }
-  void clear() { bytes_.clear(); }
-  [[nodiscard]] std::size_t size() const { return bytes_.size(); }
-  [[nodiscard]] Bytes bytes() const { return bytes_; }
-
- private:
-  template <std::size_t kSize>
-  Buffer& put(std::uint64_t value) {
-    for (std::size_t i = 0; i < kSize; ++i) bytes_.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
-    return *this;
-  }
-
-  std::vector<std::uint8_t> bytes_;
 };
 
 /// The fields of each header are in alphabetical order, as rosbag writes them.
 class Writer final : public BagWriter {
  public:
-  explicit Writer(const std::string& path) : BagWriter(path), file_(std::fopen(path.c_str(), "wbe")) {
-    if (!file_) fail();
-    write(bytesOf(kMagic));
-    writeBagRecord(0);
+  explicit Writer(const std::string& path) : BagWriter(path), file_(path) {
+    file_.write(bytesOf(kMagic));
+    file_.write(bagRecord(0).bytes());
   }
 
   [[nodiscard]] BagEncoding encoding() const override { return BagEncoding::kRos1; }
@@ -112,18 +87,14 @@ class Writer final : public BagWriter {
 
   void finish() override {
     endChunk();
-    const std::uint64_t index = at_;
-    for (const Topic& topic : topics_) write(topic.connection.bytes());
-    write(chunk_infos_.bytes());
-    if (std::fseek(file_.get(), static_cast<long>(kMagic.size()), SEEK_SET) != 0) fail();
-    writeBagRecord(index);
-    if (std::fclose(file_.release()) != 0) fail();
+    const std::uint64_t index = file_.size();
+    for (const Topic& topic : topics_) file_.write(topic.connection.bytes());
+    file_.write(chunk_infos_.bytes());
+    file_.overwrite(kMagic.size(), bagRecord(index).bytes());
+    file_.close();
   }
 
  private:
-  struct FileCloser {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   struct Topic {
     Buffer connection;  ///< its record
     bool is_written = false;
@@ -131,18 +102,8 @@ class Writer final : public BagWriter {
     std::uint32_t messages = 0;
   };
 
-  [[noreturn]] void fail() const {
-    throw InputError(path_, 0, "", std::string("cannot be written: ") + std::strerror(errno),
-                     "Check that the folder exists and is writable and the disk is not full");
-  }
-
-  void write(Bytes bytes) {
-    if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) fail();
-    at_ += bytes.size();
-  }
-
   /// Padded, so that it can be written again in place.
-  void writeBagRecord(std::uint64_t index) {
+  [[nodiscard]] Buffer bagRecord(std::uint64_t index) const {
     Buffer header;
     header.field("chunk_count", chunks_)
         .field("conn_count", static_cast<std::uint32_t>(topics_.size()))
@@ -150,7 +111,7 @@ class Writer final : public BagWriter {
         .field("op", Op::kBag);
     Buffer record;
     record.record(header, bytesOf(std::string(kBagRecord - header.size(), ' ')));
-    write(record.bytes());
+    return record;
   }
 
   void endChunk() {
@@ -177,22 +138,21 @@ class Writer final : public BagWriter {
       topic.messages = 0;
     }
     chunk_infos_.record(Buffer()
-                            .field("chunk_pos", Buffer().u64(at_).bytes())
+                            .field("chunk_pos", Buffer().u64(file_.size()).bytes())
                             .field("count", used)
                             .field("end_time", Buffer().time(chunk_last_).bytes())
                             .field("op", Op::kChunkInfo)
                             .field("start_time", Buffer().time(chunk_first_).bytes())
                             .field("ver", kIndexVersion),
                         counts.bytes());
-    write(records.bytes());
+    file_.write(records.bytes());
     ++chunks_;
     chunk_.clear();
     chunk_messages_ = 0;
   }
 
-  std::unique_ptr<std::FILE, FileCloser> file_;
-  std::uint64_t at_ = 0;  ///< bytes written
-  Buffer chunk_;          ///< being filled
+  OutputFile file_;
+  Buffer chunk_;  ///< being filled
   std::uint64_t chunk_messages_ = 0;
   Stamp chunk_first_, chunk_last_;
   std::vector<Topic> topics_;

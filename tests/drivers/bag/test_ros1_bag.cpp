@@ -136,6 +136,18 @@ TEST_CASE("ROS 1 bags that cannot be read are refused with the reason", "[ros1_b
   CHECK(refusalOf([&] { (void)openBag(file); }).message == "it counts 7 messages, but holds 6");
 }
 
+TEST_CASE("a full disk is said by the writers of ROS 1 bags and of MCAP files", "[ros1_bag][mcap]") {
+  const std::vector<PlainMessage> messages = someMessages(6, 20);
+  for (const bool ros1 : {true, false}) {
+    const InputError error = refusalOf([&] {
+      test::write(ros1 ? *makeRos1Writer("/dev/full") : *makeMcapWriter("/dev/full", McapPacking::kNone),
+                  messages);
+    });
+    CHECK(error.file == "/dev/full");
+    CHECK(error.message.find("No space left") != std::string::npos);
+  }
+}
+
 TEST_CASE("every flipped byte of a ROS 1 bag is refused, or loses no message", "[ros1_bag]") {
   const BagFolder folder;
   const std::string file = folder.file("a.bag");
