@@ -77,11 +77,14 @@ await inBrowser(executablePath, async (context, faults) => {
   expect(String(half.vehicle) !== String(start.vehicle), 'the vehicle does not move');
   expect(!withImages || half.mesh !== start.mesh, 'the mesh does not change');
 
-  // A click on a plot chooses the moment there.
+  // A click on a plot chooses the moment there, also if the page scrolls and moves meanwhile.
   const over = page.locator('figure[data-plot=velocity] .u-over');
   await over.scrollIntoViewIfNeeded();
   const box = await over.boundingBox();
-  await page.mouse.click(box.x + 0.75 * box.width, box.y + 0.5 * box.height);
+  await page.mouse.move(box.x + 0.75 * box.width, box.y + 0.5 * box.height);
+  await page.mouse.down();
+  await page.evaluate(() => window.dispatchEvent(new Event('scroll')));
+  await page.mouse.up();
   const clicked = await shown();
   const at = await page.evaluate((share) => {
     const { plot } = window.swiftletReport.runs[0].plots.get('velocity');

@@ -94,12 +94,17 @@ const shown = (value) => (value == null ? '' : Number(value).toPrecision(4));
 
 const kClick = 3; // px that the pointer may move in a click
 
-/** Calls take(t) where somebody clicks. */
+/**
+ * Calls take(t) where somebody clicks. uPlot swallows the event `click` if the page moved under the pointer, as it does
+ * when the legends get their first values.
+ */
 export function takeClicks(plot, take) {
-  let from = 0;
-  plot.over.addEventListener('mousedown', (event) => { from = event.clientX; });
-  plot.over.addEventListener('click', (event) => {
-    if (Math.abs(event.clientX - from) > kClick) return; // a zoom
+  let from = null;
+  plot.over.addEventListener('mousedown', (event) => { from = event.button === 0 ? event.clientX : null; });
+  plot.over.addEventListener('mouseup', (event) => {
+    const isZoom = from === null || Math.abs(event.clientX - from) > kClick;
+    from = null;
+    if (isZoom) return;
     take(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, 'x'));
   });
 }
@@ -154,7 +159,7 @@ export class TimePlot {
           { label: plot.x_label, labelSize: 18, size: 34, font: '11px system-ui', labelFont: '11px system-ui' },
           { label: plot.y_label, labelSize: 18, size: 58, font: '11px system-ui', labelFont: '11px system-ui' },
         ],
-        cursor: { sync: { key }, drag: { x: true, y: false }, bind: zoomBy() },
+        cursor: { sync: { key }, drag: { x: true, y: false, dist: kClick + 1 }, bind: zoomBy() },
         hooks: { setScale: [spreadZoom(key)] },
       },
       this.data(),
