@@ -107,11 +107,8 @@ MeshAccuracy meshAccuracy(const EvaluateOptions& options, const Subject& subject
   if (subject.log.empty()) {
     throw InputError(options.run, 0, "", "the log of this run is unknown", "Give the log with --truth");
   }
-  MeshEvaluationRequest request{options.run, subject.log, options.truth_mesh, {}};
-  const std::filesystem::path in_map = std::filesystem::path(options.run) / "in_map.tum";
-  std::error_code none;
-  if (std::filesystem::file_size(in_map, none) > 0 && !none) request.in_map = readEstimate(in_map);
-  return evaluateMeshes(request, readEstimate(subject.files.front()), truth.poses, accuracy_options);
+  return evaluateMeshes({options.run, subject.log, options.truth_mesh}, readEstimate(subject.files.front()),
+                        truth.poses, accuracy_options);
 }
 
 std::string titleOf(const EvaluateOptions& options, const std::string& file) {

@@ -431,26 +431,33 @@ TEST_CASE("evaluate --mesh moves the run's meshes onto the truth") {
   CHECK(again.complete->observed == 2);
   CHECK(again.complete->covered == 1);
 
-  // A map in the frame of a kept one, in which in_map.tum has the run's poses.
+  // A map in a frame of its own: in_map.tum has the run's poses there, or map.tum if loops were searched for.
   Alignment elsewhere;
   elsewhere.T_to_from = SE3(expSo3({0, 0, 0.5}), {7, 0, 0});
   writePly(folder.file("map.ply"), moved(box, elsewhere));
-  MeshEvaluationRequest located = request;
-  for (const TrajectoryPoint& point : truth)
-    located.in_map.push_back({point.stamp, elsewhere.T_to_from * point.T_world_body});
-  const MeshAccuracy in_map = evaluateMeshes(located, estimate, truth, AccuracyOptions());
-  CHECK(in_map.map->distance.rmse < 1e-4);
-  CHECK(in_map.alignment == "se3 alignment");
-  CHECK(evaluateMeshes(request, estimate, truth, AccuracyOptions()).map->distance.rmse > 0.1);
+  const auto write_poses = [&](const std::string& name, Duration late) {
+    LineFile file(folder.file(name));
+    for (const TrajectoryPoint& point : truth)
+      file.write(formatTum(point.stamp + late, elsewhere.T_to_from * point.T_world_body));
+  };
+  const auto evaluated = [&] { return evaluateMeshes(request, estimate, truth, AccuracyOptions()); };
+  write_poses("map.tum", Duration{});
+  CHECK(evaluated().map->distance.rmse > 0.1);  // of full smoothing alone
+  LineFile(folder.file("loops.csv")).write("a header");
+  CHECK(evaluated().map->distance.rmse < 1e-4);
+  CHECK(evaluated().alignment == "se3 alignment");
+  std::filesystem::rename(folder.file("map.tum"), folder.file("in_map.tum"));
+  CHECK(evaluated().map->distance.rmse < 1e-4);
 
   // No pose can be compared: the mesh is judged where it is.
-  Trajectory late = located.in_map;
-  for (TrajectoryPoint& point : late) point.stamp.ns += 1'000'000'000'000;
+  const Duration hour = Duration::fromSeconds(3600);
+  Trajectory late = truth;
+  for (TrajectoryPoint& point : late) point.stamp = point.stamp + hour;
   const std::string nothing = "nothing (no pose has a true pose at its stamp)";
+  write_poses("in_map.tum", hour);
+  CHECK(evaluated().alignment == "se3 alignment; the map by " + nothing);
+  std::filesystem::remove(folder.file("in_map.tum"));
   CHECK(evaluateMeshes(request, late, truth, AccuracyOptions()).alignment == nothing);
-  located.in_map = late;
-  CHECK(evaluateMeshes(located, estimate, truth, AccuracyOptions()).alignment ==
-        "se3 alignment; the map by " + nothing);
 }
 
 }  // namespace

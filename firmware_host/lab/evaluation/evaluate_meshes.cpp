@@ -4,6 +4,7 @@
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/open_log.hpp"
+#include "firmware_host/lab/evaluation/evaluate_run.hpp"
 #include "firmware_host/lab/evaluation/mesh_frames.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 
@@ -38,6 +39,18 @@ Fit fitOf(const Trajectory& estimate, const Trajectory& truth, const AccuracyOpt
   return fit;
 }
 
+/// The run's poses in the frame of its map.ply; empty if that is the odometry's.
+Trajectory posesOfMap(const fs::path& run) {
+  const auto has = [&](const char* name) {
+    std::error_code none;
+    return fs::file_size(run / name, none) > 0 && !none;
+  };
+  if (has("in_map.tum")) return readEstimate(run / "in_map.tum");
+  // Full smoothing writes map.tum without loop closure too, after the map was made.
+  if (has("loops.csv") && has("map.tum")) return readEstimate(run / "map.tum");
+  return {};
+}
+
 /// Path of the true surface; empty if unknown.
 std::string truthMesh(const MeshEvaluationRequest& request) {
   if (!request.truth_mesh.empty()) return request.truth_mesh;
@@ -45,7 +58,7 @@ std::string truthMesh(const MeshEvaluationRequest& request) {
   return fs::exists(path) ? path.string() : std::string();
 }
 
-TriangleMesh readTruth(const std::string& file) {
+TriangleMesh readTrueMesh(const std::string& file) {
   TriangleMesh mesh = readPly(file);
   if (mesh.faces.empty()) {
     throw InputError(file, 0, "face", "a surface without triangles", "Give a mesh, not points");
@@ -143,7 +156,8 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
   const fs::path run(request.run);
   const bool has_sequence = fs::exists(run / "meshes" / "frames.csv");
   const Fit fit = fitOf(estimate, truth, options);
-  const Fit map_fit = request.in_map.empty() ? fit : fitOf(request.in_map, truth, options);
+  const Trajectory map_poses = posesOfMap(run);
+  const Fit map_fit = map_poses.empty() ? fit : fitOf(map_poses, truth, options);
   accuracy.alignment = fit.text;
   if (accuracy.truth.empty()) {
     if (!has_sequence) {
@@ -153,7 +167,7 @@ MeshAccuracy evaluateMeshes(const MeshEvaluationRequest& request, const Trajecto
     SequenceJudge(request, truth, options, fit.alignment, nullptr)(accuracy);
     return accuracy;
   }
-  const TriangleMesh true_mesh = readTruth(accuracy.truth);
+  const TriangleMesh true_mesh = readTrueMesh(accuracy.truth);
   const TrueSurface surface(true_mesh);
   if (has_sequence) SequenceJudge(request, truth, options, fit.alignment, &surface)(accuracy);
   const fs::path observed = fs::path(accuracy.truth).parent_path() / "observed.ply";
