@@ -1,5 +1,7 @@
 #include "drivers/bag/output_file.hpp"
 
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -10,6 +12,8 @@ namespace swiftlet {
 
 OutputFile::OutputFile(std::string path) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "wbe")) {
   if (!file_) fail();
+  // Writers put whole chunks into it; one that is complete must not wait for the next.
+  std::setvbuf(file_.get(), nullptr, _IONBF, 0);
 }
 
 void OutputFile::write(std::span<const std::uint8_t> bytes) {
@@ -23,6 +27,8 @@ void OutputFile::overwrite(std::uint64_t at, std::span<const std::uint8_t> bytes
 }
 
 void OutputFile::close() {
+  // A pipe or a device has nothing to wait for.
+  if (::fdatasync(::fileno(file_.get())) != 0 && errno != EINVAL && errno != EROFS) fail();
   if (std::fclose(file_.release()) != 0) fail();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// A file that a writer of bags fills. Errors: InputError with the system's reason.
+// A file that a writer of bags fills. Errors: InputError with the system's reason. What is written survives
+// the program, and a power cut once the system has put it on the disk or close() has returned.
 
 #include <cstdint>
 #include <cstdio>
@@ -18,7 +19,7 @@ class OutputFile {
   [[nodiscard]] std::uint64_t size() const { return size_; }
   /// Writes over bytes that are there.
   void overwrite(std::uint64_t at, std::span<const std::uint8_t> bytes);
-  /// Reports a full disk; nothing may be written afterwards.
+  /// Waits until all is on the disk; nothing may be written afterwards.
   void close();
 
  private:

@@ -2,8 +2,8 @@
 // A live recording as one MCAP file with ROS 2 messages: /imu0, /cam0/image_raw, /cam0/camera_info, ... as
 // written by `swiftlet export` (docs/export.md), images uncompressed.
 //
-// One writer for all. The file has its final name from the beginning: after a power cut it is readable up to
-// the last complete chunk of 1 MiB.
+// One writer for all. The file has its final name from the beginning and is readable up to the last chunk of
+// 1 MiB that was complete when the program was killed, or that was on the disk at a power cut.
 
 #include <array>
 #include <string>
