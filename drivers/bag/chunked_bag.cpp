@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "drivers/bag/mcap_records.hpp"
 #include "drivers/input/input_error.hpp"
 
@@ -14,8 +16,10 @@ void ChunkedBag::fail(std::uint64_t at, const std::string& what) const {
 }
 
 void ChunkedBag::beginChunk(const Chunk& chunk) {
-  if (chunk.unpacked > kMostUnpacked) {
-    fail(chunk.record, fmt::format("a chunk of {} bytes is too large", chunk.unpacked));
+  if (const std::uint64_t most = std::max(chunk.packed, chunk.unpacked); most > kMostUnpacked) {
+    throw InputError(path_, 0, fmt::format("byte {}", chunk.record),
+                     fmt::format("a chunk of {} bytes is too large", most),
+                     "Copy the file again if it is damaged, else write it with chunks of a few MiB");
   }
   before_chunk_ = entries_.size();
   chunk_open_ = true;
@@ -41,8 +45,8 @@ void ChunkedBag::endEarly(std::uint64_t at) {
     }
   }
   warnings_.push_back(fmt::format(
-      "{}: not closed by its recorder, or truncated: {} messages up to byte {} are intact and are read",
-      path_, entries_.size(), at));
+      "{}: not closed by its recorder, or truncated: {} messages up to byte {} of {} are intact and are read",
+      path_, entries_.size(), at, file_.size()));
 }
 
 std::span<const std::uint8_t> ChunkedBag::unpackedChunk(std::uint32_t index) {
@@ -57,9 +61,12 @@ std::span<const std::uint8_t> ChunkedBag::unpackedChunk(std::uint32_t index) {
   }
   const Chunk& chunk = chunks_[index];
   oldest->chunk = kNoChunk;
-  file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), packed_);
-  if (packed_.size() != chunk.packed ||
-      !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), oldest->bytes)) {
+  const bool packed = chunk.packing != Packing::kNone;
+  std::vector<std::uint8_t>& read = packed ? packed_ : oldest->bytes;
+  file_.read(chunk.data, static_cast<std::size_t>(chunk.packed), read);
+  if (read.size() != chunk.packed) fail(chunk.record, "a chunk is truncated");
+  if (packed ? !unpack(chunk.packing, packed_, static_cast<std::size_t>(chunk.unpacked), oldest->bytes)
+             : chunk.packed != chunk.unpacked) {
     fail(chunk.record, "a chunk cannot be decompressed");
   }
   if (chunk.crc != 0 && mcap::crcOf(0, oldest->bytes) != chunk.crc) {

@@ -15,6 +15,7 @@ namespace swiftlet {
 namespace {
 
 constexpr std::size_t kWindow = std::size_t{16} << 10U;  // bytes; the message indexes of a chunk fit in it
+constexpr std::size_t kMostAtOnce = std::size_t{64} << 20U;  // bytes; definitions of types have some 100 kB
 
 }  // namespace
 
@@ -52,10 +53,16 @@ std::size_t FileBytes::readInto(std::uint64_t offset, std::span<std::uint8_t> ou
 std::span<const std::uint8_t> FileBytes::at(std::uint64_t offset, std::size_t length) {
   if (offset >= size_) return {};
   length = static_cast<std::size_t>(std::min<std::uint64_t>(length, size_ - offset));
+  if (length > kMostAtOnce) {
+    throw InputError(name_, 0, fmt::format("byte {}", offset),
+                     fmt::format("a record of {} bytes is too large", length),
+                     "The file is damaged: copy it again");
+  }
   const bool inside = offset >= window_begin_ && offset - window_begin_ + length <= window_size_;
   if (!inside) {
     const std::size_t wanted =
         static_cast<std::size_t>(std::min<std::uint64_t>(std::max(length, kWindow), size_ - offset));
+    window_size_ = 0;  // if reading fails, it holds nothing
     if (window_.size() < wanted) window_.resize(wanted);
     window_begin_ = offset;
     window_size_ = readInto(offset, std::span(window_).first(wanted));

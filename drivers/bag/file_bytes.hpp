@@ -1,8 +1,8 @@
 #pragma once
 // Random access to the bytes of a file through a small window, so that consecutive records need few reads.
 //
-// Errors: InputError if the file cannot be opened or read. A request beyond the end returns only the bytes
-// that exist.
+// Errors: InputError if the file cannot be opened or read, and from at() for more than 64 MiB. A request
+// beyond the end returns only the bytes that exist.
 
 #include <cstddef>
 #include <cstdint>

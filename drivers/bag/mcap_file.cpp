@@ -108,6 +108,7 @@ void McapFile::findEnd() {
 void McapFile::readSummary() {
   constexpr std::uint64_t kCrc = 4;
   const std::uint64_t size = file_.size() - mcap::kMagic.size() - summary_;
+  if (size > kMostUnpacked) fail(footer_, fmt::format("a summary of {} bytes is too large", size));
   std::vector<std::uint8_t> bytes;
   file_.read(summary_, static_cast<std::size_t>(size), bytes);
   if (bytes.size() != size) fail(summary_, "the file is truncated");
@@ -194,8 +195,8 @@ bool McapFile::takeRecord(std::uint64_t& at) {
   const std::uint64_t length = reader.u64();
   const std::uint64_t content = at + mcap::kRecordHead;
   const std::uint64_t end = finished_ ? footer_ : file_.size();
-  // No record is of kind 0. The data is complete only in a finished file.
-  const bool ends = (op == Op{} && zero_tail_) || (op == Op::kDataEnd && !finished_);
+  // No record is of kind 0: the zeros are bytes that were not written before a power cut.
+  const bool ends = op == Op{} || (op == Op::kDataEnd && !finished_);
   if (!reader.ok() || content > end || length > end - content || ends) {
     endData(at);
     return false;

@@ -35,6 +35,7 @@ class File final : public ChunkedBag {
   void readBagRecord();
   void readTail();
   void walk();
+  bool mayEndIn(std::uint64_t at);
   void takeRecord(const Head& head, std::uint64_t at);
   void takeConnection(Bytes header, Bytes data, std::uint64_t place);
   void takeChunk(const Head& head, std::uint64_t at);
@@ -128,9 +129,25 @@ void File::walk() {
     }
     if (finished_) closeChunk();
   } catch (const InputError&) {
-    if (finished_) throw;
+    if (finished_ || !mayEndIn(at)) throw;
   }
   if (!finished_) endEarly(at);
+}
+
+/// Whether the record at `at` is the one that a recorder was writing when it ended; else it is damaged.
+bool File::mayEndIn(std::uint64_t at) {
+  // A compressed chunk gets its length when it is complete.
+  if (chunkIsOpen() && chunks_.back().packed == 0 && chunks_.back().packing != Packing::kNone) return true;
+  // After a power cut, zeros stand where bytes were not written.
+  constexpr std::size_t kLengths = 2 * sizeof(std::uint32_t);
+  for (const std::uint64_t place : {at, file_.size() - kLengths}) {
+    if (std::ranges::all_of(file_.at(place, kLengths), [](std::uint8_t byte) { return byte == 0; }))
+      return true;
+  }
+  const std::uint32_t header = LittleFieldReader(file_.at(at, sizeof(std::uint32_t))).u32();
+  if (header > kMostHeader) return false;
+  const Bytes bytes = file_.at(at, header + kLengths);
+  return bytes.size() < header + kLengths || headOf(bytes).length > file_.size() - at - bytes.size();
 }
 
 void File::takeRecord(const Head& head, std::uint64_t at) {

@@ -142,8 +142,7 @@ bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t s
             std::vector<std::uint8_t>& out) {
   switch (packing) {
     case Packing::kNone:
-      out.assign(packed.begin(), packed.end());
-      break;
+      return false;
     case Packing::kLz4:
       if (!unpackLz4(packed, size, out)) return false;
       break;

@@ -17,7 +17,7 @@ enum class Packing : std::uint8_t { kNone, kLz4, kZstd, kBz2 };
 constexpr std::uint64_t kMostUnpacked = std::uint64_t{1}
                                         << 30U;  // bytes per chunk; recorders make 1 to 4 MiB
 
-/// Decompresses all of `packed`; false unless the result has exactly `size` bytes.
+/// Decompresses all of `packed`; false unless it is compressed and the result has exactly `size` bytes.
 [[nodiscard]] bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t size,
                           std::vector<std::uint8_t>& out);
 

@@ -94,11 +94,33 @@ TEST_CASE("a ROS 1 bag that its recorder did not close is read to its last messa
   const auto bag = openBag(file);
   CHECK(readBack(*bag) == messages);
   CHECK(bag->warnings().size() == 1);
-  bytes.resize(end - 50'000);
-  test::writeBytes(file, bytes);
-  const std::vector<PlainMessage> read = readBack(file);
-  CHECK(read.size() == messages.size() - 1);
-  CHECK(std::equal(read.begin(), read.end(), messages.begin()));
+  const auto first_of = [&](const std::vector<std::uint8_t>& changed, std::ptrdiff_t damaged = 0) {
+    test::writeBytes(file, changed);
+    const std::vector<PlainMessage> read = readBack(file);
+    CHECK(std::equal(read.begin(), read.end() - damaged, messages.begin()));
+    return read.size();
+  };
+  // Killed, after a power cut, and with a compressed chunk: until then it has no length, and then no records.
+  CHECK(first_of({bytes.begin(), bytes.end() - 50'000}) == messages.size() - 1);
+  std::vector<std::uint8_t> zeros = bytes;
+  std::fill(zeros.end() - 150'000, zeros.end(), std::uint8_t{0});
+  CHECK(first_of(zeros, 1) == messages.size() - 1);  // a body has no checksum
+  std::vector<std::uint8_t> compressed(bytes.begin(), bytes.end() - 50'000);
+  const std::size_t packing = placeOf(bytes, "compression=none", chunk - 50);
+  putNumber(compressed, packing - 8, numberAt(bytes, packing - 8) - 1);
+  putNumber(compressed, packing - 4, numberAt(bytes, packing - 4) - 1);
+  std::copy_n("lz4", 3, compressed.begin() + static_cast<std::ptrdiff_t>(packing) + 12);
+  compressed.erase(compressed.begin() + static_cast<std::ptrdiff_t>(packing) + 15);
+  std::fill(compressed.begin() + static_cast<std::ptrdiff_t>(size_at + 7), compressed.end(),
+            std::uint8_t{0xA5});
+  CHECK(first_of(compressed) == 16);
+
+  // Damage before the end is no end.
+  std::vector<std::uint8_t> damaged = bytes;
+  const std::size_t second = placeOf(bytes, "compression=none", placeOf(bytes, "compression=none") + 1);
+  damaged[second - 1] = 0xFF;  // of the field's length
+  test::writeBytes(file, damaged);
+  CHECK(refusalOf([&] { (void)openBag(file); }).field.starts_with("byte "));
 }
 
 TEST_CASE("an index that points to the connection before its message is followed", "[ros1_bag]") {
