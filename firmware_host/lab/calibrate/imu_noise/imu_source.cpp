@@ -46,16 +46,27 @@ void readFile(const std::string& path, LogWarnings& warnings, const Take& take) 
   readRows(csv, warnings, take);
 }
 
-std::vector<ImuSample> ofTopic(BagFile& bag, std::uint32_t topic) {
+std::vector<ImuSample> ofTopic(BagFile& bag, std::uint32_t topic, LogWarnings& warnings) {
   std::vector<ImuSample> samples;
+  std::uint64_t bad = 0;
   for (const BagEntry& entry : bag.entries()) {
     rosmsg::Imu imu;
-    if (entry.topic != topic || !decode(bag.read(entry), bag.topics()[topic].encoding, imu)) continue;
+    if (entry.topic != topic) continue;
+    if (!decode(bag.read(entry), bag.topics()[topic].encoding, imu)) {
+      ++bad;
+      continue;
+    }
     ImuSample sample;
     sample.stamp = imu.header.stamp.ns == 0 ? entry.log_time : imu.header.stamp;
     sample.gyro = {imu.angular_velocity.x, imu.angular_velocity.y, imu.angular_velocity.z};
     sample.accel = {imu.linear_acceleration.x, imu.linear_acceleration.y, imu.linear_acceleration.z};
-    if (sample.gyro.allFinite() && sample.accel.allFinite()) samples.push_back(sample);
+    const bool finite = sample.gyro.allFinite() && sample.accel.allFinite();
+    bad += finite ? 0 : 1;
+    if (finite) samples.push_back(sample);
+  }
+  if (bad > 0) {
+    warnings.add(fmt::format("{}: {}: {} messages are damaged or not finite, skipped", bag.path(),
+                             bag.topics()[topic].name, bad));
   }
   return samples;
 }
@@ -65,10 +76,10 @@ void readBag(const std::string& path, LogWarnings& warnings, const Take& take) {
   for (const std::string& line : bag->warnings()) warnings.add(line);
   const BagImuTopics topics = chooseImuTopics(*bag, "", warnings);
   LogCounters counters;
-  std::vector<ImuSample> samples = ofTopic(*bag, topics.gyro);
+  std::vector<ImuSample> samples = ofTopic(*bag, topics.gyro, warnings);
   orderSamples(samples, path, counters, warnings);
   if (topics.accel) {
-    std::vector<ImuSample> accel = ofTopic(*bag, *topics.accel);
+    std::vector<ImuSample> accel = ofTopic(*bag, *topics.accel, warnings);
     orderSamples(accel, path, counters, warnings);
     std::uint64_t left_out = 0;
     samples = joinImu(samples, accel, left_out);
