@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace swiftlet {
 namespace {
@@ -61,11 +62,20 @@ void AutopilotLink::say(mavlink::StatusText::Severity severity, std::string_view
 std::size_t AutopilotLink::step(Stamp now, const NavState* state, const Eigen::Vector3d& omega_body,
                                 std::span<std::uint8_t, kMostBytes> out) {
   if (!asked_.empty()) asked_.front().tc1 = now.ns;
-  std::size_t written = answerTimesync(out);
-  written += beat(now, state, out.subspan(written));
-  written += tellPose(now, state, omega_body, out.subspan(written));
-  written += tellObstacles(out.subspan(written));
-  return written + tellText(out.subspan(written));
+  std::size_t written = onLine(now, answerTimesync(out));
+  written += onLine(now, beat(now, state, out.subspan(written)));
+  written += onLine(now, tellText(now, out.subspan(written)));
+  written += onLine(now, tellPose(now, state, omega_body, out.subspan(written)));
+  return written + onLine(now, tellObstacles(now, out.subspan(written)));
+}
+
+Stamp AutopilotLink::lineFree(Stamp now, std::size_t bytes) const {
+  return std::max(line_free_, now) + Duration{static_cast<std::int64_t>(bytes) * byte_time_.ns};
+}
+
+std::size_t AutopilotLink::onLine(Stamp now, std::size_t bytes) {
+  line_free_ = lineFree(now, bytes);
+  return bytes;
 }
 
 std::size_t AutopilotLink::answerTimesync(std::span<std::uint8_t> out) {
@@ -88,7 +98,7 @@ std::size_t AutopilotLink::beat(Stamp now, const NavState* state, std::span<std:
 std::size_t AutopilotLink::tellPose(Stamp now, const NavState* state, const Eigen::Vector3d& omega_body,
                                     std::span<std::uint8_t> out) {
   const bool newer = state != nullptr && usable(*state) && (!any_ || state->stamp > sent_);
-  if (newer && now - state->stamp <= kOldest) fresh_ = now;
+  if (newer && now - state->stamp <= kOldest && state->stamp - now <= kMostAhead) fresh_ = now;
   const bool fresh = newer && fresh_ == now;
   if (any_ && !lost_ && ((state != nullptr && !usable(*state)) || now - fresh_ > kSilence)) {
     lost_ = true;
@@ -96,6 +106,11 @@ std::size_t AutopilotLink::tellPose(Stamp now, const NavState* state, const Eige
     ++counters_.losses;
   }
   if (now < next_pose_) return 0;
+  if (lineFree(now) - now > kMostWaiting) {
+    if (fresh && !std::exchange(holding_, true)) ++counters_.held_back;
+    return 0;
+  }
+  holding_ = false;
   if (!fresh) {
     if (newer) ++counters_.too_old;
     if (!lost_ || now - lost_since_ > kTellLoss) return 0;
@@ -143,16 +158,22 @@ std::size_t AutopilotLink::writeLoss(Stamp now, std::span<std::uint8_t> out) {
   return mavlink::write(sender_, message, out);
 }
 
-std::size_t AutopilotLink::tellObstacles(std::span<std::uint8_t> out) {
+std::size_t AutopilotLink::tellObstacles(Stamp now, std::span<std::uint8_t> out) {
   if (!obstacles_) return 0;
+  const Stamp seen{static_cast<std::int64_t>(obstacles_->time_usec) * kNanosecondsPerMicrosecond};
+  if (now - seen > kOldestObstacles) {
+    obstacles_.reset();
+    return 0;
+  }
   const std::size_t length = mavlink::write(sender_, *obstacles_, out);
+  if (lineFree(now, length) - std::max(now, next_pose_) > kMostWaiting) return 0;
   obstacles_.reset();
   ++counters_.obstacles;
   return length;
 }
 
-std::size_t AutopilotLink::tellText(std::span<std::uint8_t> out) {
-  if (texts_.empty()) return 0;
+std::size_t AutopilotLink::tellText(Stamp now, std::span<std::uint8_t> out) {
+  if (texts_.empty() || lineFree(now) - now > kMostWaiting) return 0;
   Text& text = texts_.front();
   mavlink::StatusText message;
   message.severity = text.severity;

@@ -19,6 +19,7 @@
 #include <span>
 
 #include "estimator/core/spsc_ring.hpp"
+#include "estimator/core/stamp.hpp"
 
 namespace swiftlet {
 
@@ -41,6 +42,8 @@ class LinkOutbox {
   [[nodiscard]] bool attended() const { return attended_.load(std::memory_order_acquire); }
   /// Whether the autopilot at the other end reports that it is PX4.
   [[nodiscard]] bool px4() const { return px4_.load(std::memory_order_relaxed); }
+  /// Time that the port takes for a byte; 0: none.
+  [[nodiscard]] Duration byteTime() const { return {byte_time_.load(std::memory_order_relaxed)}; }
   /// False: there is no room, or `bytes` is too long.
   [[nodiscard]] bool push(std::span<const std::uint8_t> bytes) {
     if (bytes.size() > kMostBytes) return false;
@@ -56,6 +59,7 @@ class LinkOutbox {
   // For the owner.
   void attend(bool attended) { attended_.store(attended, std::memory_order_release); }
   void tellPx4(bool px4) { px4_.store(px4, std::memory_order_relaxed); }
+  void tellByteTime(Duration time) { byte_time_.store(time.ns, std::memory_order_relaxed); }
   /// Poll for reading: readable while something is queued.
   [[nodiscard]] int descriptor() const { return wake_; }
   /// Resets the wake-up; call before taking queued messages.
@@ -74,6 +78,7 @@ class LinkOutbox {
 
   int wake_;
   std::atomic<bool> attended_{false}, px4_{false};
+  std::atomic<std::int64_t> byte_time_{0};
   SpscRing<Bytes, kPushes> ring_;
 };
 

@@ -89,6 +89,7 @@ DeviceFault PortImuLink::send() {
   }
   if (outbox_ == nullptr) return {};
   outbox_->tellPx4(dialogue_.px4());
+  outbox_->tellByteTime(port_.byteTime());
   outbox_->hush();
   if (!outbox_->attended()) {
     // Drop messages queued while the link was down.

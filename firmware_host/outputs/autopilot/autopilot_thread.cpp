@@ -104,6 +104,7 @@ class AutopilotThread::Work final : public Follower::Work {
             {"poses_of_failure", c.lost_poses},
             {"losses", c.losses},
             {"states_too_old", c.too_old},
+            {"poses_held_back", c.held_back},
             {"obstacles", c.obstacles},
             {"timesync_answers", c.timesync_answers},
             {"texts_dropped", c.texts_dropped},
@@ -146,6 +147,7 @@ class AutopilotThread::Work final : public Follower::Work {
       // More data than a port sends is a flood, which must not occupy the CPU.
       if (!hear()) sleepFor(kFloodPause);
       takeNews();
+      link_.knowLine(port_.byteTime());
       tell();
     }
   }
@@ -156,6 +158,7 @@ class AutopilotThread::Work final : public Follower::Work {
       sleepFor(kRound);
       takeNews();
       link_.knowPx4(outbox.px4());
+      link_.knowLine(outbox.byteTime());
       if (outbox.attended()) tell();
     }
   }
@@ -298,11 +301,13 @@ class AutopilotThread::Work final : public Follower::Work {
     if (number_ == 0 || now < next_obstacles_ || outlet_.mesh.refresh() == 0) return;
     // Keeps the rate on average, without sending two in a row after a pause.
     next_obstacles_ = std::max(next_obstacles_ + kObstaclePeriod, now + Duration{kObstaclePeriod.ns / 2});
-    const Stamp stamp = onHost(outlet_.mesh.value().stamp);
-    if (now - stamp > kOldestObstacles || now - state_.stamp > AutopilotLink::kOldest) return;
+    if (now - state_.stamp > AutopilotLink::kOldest) return;
     // The same mesh is sent again while it is fresh, seen from the vehicle's current position. Mesh and state
     // are on the run's clock.
-    if (auto message = obstacleDistanceOf(outlet_.mesh.value(), outlet_.state.value().state(), mounting_)) {
+    NavState seen_from = outlet_.state.value().state();
+    seen_from.health = state_.health;
+    if (auto message = obstacleDistanceOf(outlet_.mesh.value(), seen_from, mounting_)) {
+      const Stamp stamp = onHost(outlet_.mesh.value().stamp);
       message->time_usec = static_cast<std::uint64_t>(stamp.ns / kNanosecondsPerMicrosecond);
       link_.show(*message);
     }
@@ -312,11 +317,13 @@ class AutopilotThread::Work final : public Follower::Work {
     std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
     const std::uint64_t poses = link_.counters().poses;
     const std::size_t count = link_.step(monotonicNow(), number_ > 0 ? &state_ : nullptr, omega_body_, bytes);
+    if (link_.counters().held_back > held_back_) noteLoss({});
+    held_back_ = link_.counters().held_back;
     if (count == 0) return;
     if (const DeviceFault fault = send(std::span(bytes).first(count)); !fault.ok()) {
       ++refused_;
       if (fault.kind == DeviceFaultKind::kUnplugged) return fail(fault);
-      noteRefusal(fault);
+      noteLoss(fault);
     } else if (link_.counters().poses > poses) {
       age_.add((monotonicNow() - state_.stamp).seconds());
     }
@@ -330,13 +337,15 @@ class AutopilotThread::Work final : public Follower::Work {
     return deviceFault(DeviceFaultKind::kFailed, 0, "the IMU's link accepts no more data");
   }
 
-  void noteRefusal(const DeviceFault& fault) {
+  void noteLoss(const DeviceFault& fault) {
     const Stamp now = monotonicNow();
     if (now < next_refusal_) return;
     next_refusal_ = now + options_.repeat;
     const char* remedy = port_.isUdp() ? "check that the network is up and the host is reachable"
                                        : "raise autopilot.baud, or lower autopilot.rate_hz";
-    journal_.note(now, deviceFault(DeviceFaultKind::kLossy, fault.error, "%llu writes rejected so far: %s",
+    journal_.note(now, deviceFault(DeviceFaultKind::kLossy, fault.error,
+                                   "%llu poses held back and %llu writes rejected so far: %s",
+                                   static_cast<unsigned long long>(link_.counters().held_back),
                                    static_cast<unsigned long long>(refused_), remedy));
   }
 
@@ -365,7 +374,7 @@ class AutopilotThread::Work final : public Follower::Work {
   Stamp next_obstacles_;
   Stamp next_reasons_;
   Stamp next_refusal_;
-  std::uint64_t refused_ = 0;
+  std::uint64_t refused_ = 0, held_back_ = 0;
   LatencyHistogram age_;
 };
 

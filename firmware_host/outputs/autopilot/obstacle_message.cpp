@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/mavlink/autopilot_link.hpp"
 #include "mesher/obstacle_queries.hpp"
 
 namespace swiftlet {
@@ -27,7 +28,8 @@ std::uint16_t told(float metres) {
 
 std::optional<mavlink::ObstacleDistance> obstacleDistanceOf(const LocalMesh& mesh, const NavState& state,
                                                             const AutopilotMounting& mounting) {
-  if (mesh.epoch != state.epoch || state.stamp - mesh.stamp > kOldestObstacles) return std::nullopt;
+  if (mesh.epoch != state.epoch || state.stamp - mesh.stamp > AutopilotLink::kOldestObstacles)
+    return std::nullopt;
   if (state.health != Health::kGood && state.health != Health::kDegraded) return std::nullopt;
   const SE3& T = state.T_world_body;
   const Eigen::Matrix3d R_world_vehicle = T.R() * mounting.q_vehicle_body.conjugate().toRotationMatrix();

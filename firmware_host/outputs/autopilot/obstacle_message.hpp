@@ -16,15 +16,12 @@
 
 namespace swiftlet {
 
-/// Older meshes are not sent.
-inline constexpr Duration kOldestObstacles = Duration::fromMilliseconds(500);
-
 /// [m] The position of farther triangles is too uncertain to report.
 inline constexpr float kObstacleReach = 20;
 
-/// Empty if the mesh is of another epoch, if it is older than kOldestObstacles at `state`, or if the state's
-/// health does not allow flight, so that the vehicle's position relative to the mesh is unknown. The message
-/// has the mesh's stamp.
+/// Empty if the mesh is of another epoch, if it is older than AutopilotLink::kOldestObstacles at `state`, or
+/// if the state's health does not allow flight, so that the vehicle's position relative to the mesh is
+/// unknown. The message has the mesh's stamp.
 std::optional<mavlink::ObstacleDistance> obstacleDistanceOf(const LocalMesh& mesh, const NavState& state,
                                                             const AutopilotMounting& mounting);
 

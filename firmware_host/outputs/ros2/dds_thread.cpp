@@ -147,7 +147,7 @@ class DdsThread::Work final : public Follower::Work {
     if (number == state_) return;
     state_ = number;
     const NavState state = outlet_.state.value().state();
-    if (state.health == Health::kFailed) return;  // there is no valid pose
+    if (state.health == Health::kFailed || judgedFailed()) return;  // there is no valid pose
     DdsOdometry odometry;
     odometry.stamp = ros(state.stamp);
     odometry.frame = frames_.odom;
@@ -165,6 +165,13 @@ class DdsThread::Work final : public Follower::Work {
         DdsTransform{odometry.stamp, frames_.map, frames_.odom, corrected ? now.T_map_world : SE3()},
         DdsTransform{odometry.stamp, frames_.odom, frames_.body, state.T_world_body}};
     link_.publish(transforms);
+  }
+
+  /// The supervisor may know it before the estimator does.
+  bool judgedFailed() {
+    const bool judged = outlet_.verdict.refresh() > 0;
+    const Verdict& verdict = outlet_.verdict.value();
+    return judged && !verdict.stale(monotonicNow()) && verdict.health == Health::kFailed;
   }
 
   /// Publishes at once when something changes, and every second even if no frames arrive.

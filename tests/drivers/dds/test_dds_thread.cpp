@@ -394,11 +394,11 @@ TEST_CASE("diagnostics tell the verdict at once, and go on while no frame comes"
   DdsThread thread(*outlet, optionsFor(exchange));
   PeerProcess peer(SWIFTLET_DDS_LABELLER, peerArguments({"dump=1"}));
   std::string text;
-  const auto heard = [&](const std::string& what) {
+  const auto heard = [&](const std::string& what, const char* topic = "diagnostics") {
     std::istringstream lines(text);
     int count = 0;
     for (std::string line; std::getline(lines, line);) {
-      count += line.starts_with("diagnostics") && line.find(what) != std::string::npos ? 1 : 0;
+      count += line.starts_with(topic) && line.find(what) != std::string::npos ? 1 : 0;
     }
     return count;
   };
@@ -434,6 +434,21 @@ TEST_CASE("diagnostics tell the verdict at once, and go on while no frame comes"
   verdict.troubles.clear();
   ++verdict.trouble_changes;
   until("degraded swiftlet", 1, supervise);
+  // Odometry ends with the verdict, even if the estimator still calls its state good.
+  NavState state;
+  state.health = Health::kGood;
+  const auto fly = [&] {
+    state.stamp = monotonicNow();
+    outlet->state.write({state, Eigen::Vector3d::Zero()});
+    supervise();
+  };
+  until("degraded", heard("degraded") + 2, fly);
+  CHECK(heard("", "odometry") > 0);
+  verdict.health = Health::kFailed;
+  until("swiftlet/health failed", 1, fly);
+  const int before = heard("", "odometry");
+  until("swiftlet/health failed", 3, fly);
+  CHECK(heard("", "odometry") == before);
   static_cast<void>(thread.finish());
   peer.finish();
 }

@@ -206,6 +206,79 @@ TEST_CASE("A state that comes late is not sent as new", "[mavlink]") {
   CHECK(link.counters().too_old == 1);
 }
 
+TEST_CASE("A state of the future is not sent, and ends no later ones", "[mavlink]") {
+  AutopilotLink link({});
+  NavState state;
+  state.health = Health::kGood;
+  std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
+  state.stamp = kBegin + Duration::fromMilliseconds(500);
+  static_cast<void>(link.step(kBegin, &state, Eigen::Vector3d::Zero(), bytes));
+  CHECK(link.counters().poses == 0);
+  CHECK(link.counters().too_old == 1);
+  state.stamp = kBegin;
+  static_cast<void>(link.step(kBegin + kLinkStep, &state, Eigen::Vector3d::Zero(), bytes));
+  CHECK(link.counters().poses == 1);
+}
+
+TEST_CASE("Obstacles that waited for the link are not sent as new", "[mavlink]") {
+  for (const bool late : {false, true}) {
+    AutopilotLink link({});
+    mavlink::ObstacleDistance obstacles;
+    obstacles.time_usec = static_cast<std::uint64_t>(kBegin.ns / 1000);
+    link.show(obstacles);
+    std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
+    const Stamp now = kBegin + AutopilotLink::kOldestObstacles + (late ? kLinkStep : Duration{});
+    static_cast<void>(link.step(now, nullptr, Eigen::Vector3d::Zero(), bytes));
+    CHECK(link.counters().obstacles == (late ? 0 : 1));
+  }
+}
+
+TEST_CASE("On a slow line nothing waits long, and poses come first", "[mavlink]") {
+  struct Line {
+    int baud;
+    double poses, obstacles;  // Hz, at least
+  };
+  for (const Line& line : {Line{921'600, 39.5, 9.9}, Line{115'200, 39.5, 7}, Line{57'600, 20, 0}}) {
+    INFO(line.baud << " baud");
+    const Duration byte_time{10'000'000'000 / line.baud};
+    AutopilotLink link({});
+    link.knowLine(byte_time);
+    Autopilot autopilot;
+    MavlinkSender asker;
+    std::array<std::uint8_t, kLongestMavlinkFrame> request;
+    const std::size_t length = mavlink::write(asker, mavlink::Timesync{0, 1, 0, 0}, request);
+    NavState state;
+    state.health = Health::kGood;
+    Stamp free = kBegin;  // when the line has sent all
+    Duration oldest;      // of poses, with all that was written with them
+    constexpr int kSeconds = 60;
+    // As the thread does it: a round every 5 ms, states at 200 Hz that come 3 ms after their stamps.
+    for (int round = 0; round < 200 * kSeconds; ++round) {
+      const Stamp now = kBegin + Duration::fromMilliseconds(5 * round);
+      state.stamp = now - Duration::fromMilliseconds(3);
+      if (round % 20 == 0) {
+        mavlink::ObstacleDistance seen;
+        seen.time_usec = static_cast<std::uint64_t>(now.ns / 1000);
+        link.show(seen);
+        link.receive(std::span(request).first(length), now, byte_time);
+      }
+      if (round % 200 == 0) link.say(mavlink::StatusText::Severity::kInfo, "swiftlet: ready to arm");
+      std::array<std::uint8_t, AutopilotLink::kMostBytes> bytes;
+      const std::uint64_t poses = link.counters().poses;
+      const std::size_t count = link.step(now, &state, Eigen::Vector3d::Zero(), bytes);
+      free = std::max(free, now) + Duration{static_cast<std::int64_t>(count) * byte_time.ns};
+      autopilot.hear(std::span(bytes).first(count), now);
+      if (link.counters().poses > poses) oldest = std::max(oldest, free - state.stamp);
+    }
+    CHECK(static_cast<double>(link.counters().poses) >= line.poses * kSeconds);
+    CHECK(static_cast<double>(link.counters().obstacles) >= line.obstacles * kSeconds);
+    CHECK(oldest < Duration::fromMilliseconds(100));
+    CHECK(autopilot.texts.size() >= kSeconds - 1);
+    CHECK(autopilot.answers.size() >= 10 * kSeconds - 1);
+    CHECK((link.counters().held_back > 0) == (line.baud < 200'000));
+  }
+}
+
 TEST_CASE("TIMESYNC is answered with our clock and the asker's stamp, at once", "[mavlink]") {
   Flight flight;
   flight.fly(Duration::fromMilliseconds(100));

@@ -65,6 +65,17 @@ struct Vehicle {
     state.T_world_body.translation.x() = (now - begin).seconds();
     outlet.state.write({state, Eigen::Vector3d::Zero()});
   }
+  /// A triangle at x = 9 m, of now.
+  void showWall() {
+    LocalMesh& mesh = outlet.mesh.draft();
+    mesh = {};
+    mesh.stamp = monotonicNow() - clock;
+    for (const Eigen::Vector3f& p : {Eigen::Vector3f(9, -1, -1), {9, 1, -1}, {9, 0, 1}}) {
+      static_cast<void>(mesh.vertices.tryPushBack({0, p, 0}));
+    }
+    static_cast<void>(mesh.faces.tryPushBack({{0, 1, 2}, kNoLabel}));
+    outlet.mesh.publish();
+  }
   /// The verdict as it was, of now.
   void supervise() {
     verdict.evaluated = monotonicNow();

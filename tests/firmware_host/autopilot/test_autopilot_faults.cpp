@@ -225,6 +225,25 @@ TEST_CASE("A mesh that stands is told at the rate while it is fresh, from where 
   }
 }
 
+TEST_CASE("Obstacles end where the supervisor knows of a failure that the estimator does not see",
+          "[autopilot]") {
+  Plug plug;
+  Vehicle vehicle;
+  AutopilotThread autopilot(vehicle.outlet, optionsOf(plug.terminal.path()));
+  const auto fly = [&] {
+    vehicle.move();
+    vehicle.showWall();
+    plug.listen();
+  };
+  vehicle.tellHealth(Health::kGood);
+  REQUIRE(until([&] { return plug.heard.obstacles.size() > 2; }, fly));
+  vehicle.tellHealth(Health::kFailed);
+  REQUIRE(until([&] { return std::ranges::count(plug.heard.texts, "swiftlet: failed") > 0; }, fly));
+  const std::size_t before = plug.heard.obstacles.size();
+  pass(0.5, fly);
+  CHECK(plug.heard.obstacles.size() == before);
+}
+
 TEST_CASE("A port that takes nothing loses what is sent, counted and noted, and keeps nobody",
           "[autopilot]") {
   Plug plug;

@@ -138,14 +138,7 @@ TEST_CASE("Over UDP, of a log with a clock of its own, with obstacles; silence i
   const auto enough = [&] { return !lines.empty() && heard.poses.size() > 30 && heard.obstacles.size() > 8; };
   REQUIRE(until(enough, [&] {
     vehicle.move();
-    LocalMesh& mesh = vehicle.outlet.mesh.draft();
-    mesh = {};
-    mesh.stamp = monotonicNow() - vehicle.clock;
-    for (const Eigen::Vector3f& p : {Eigen::Vector3f(9, -1, -1), {9, 1, -1}, {9, 0, 1}}) {
-      static_cast<void>(mesh.vertices.tryPushBack({0, p, 0}));
-    }
-    static_cast<void>(mesh.faces.tryPushBack({{0, 1, 2}, kNoLabel}));
-    vehicle.outlet.mesh.publish();
+    vehicle.showWall();
     autopilot.drainEvents([&](Stamp, const std::string& line) { lines.push_back(line); });
     listen();
   }));

@@ -124,7 +124,7 @@ TEST_CASE("An old mesh, one of another epoch, one from a lost state say nothing"
   const auto mesh = wallAt({4, 0, 0});
   NavState state;
   state.health = Health::kGood;
-  state.stamp = kNow + kOldestObstacles;
+  state.stamp = kNow + AutopilotLink::kOldestObstacles;
   CHECK(obstacleDistanceOf(*mesh, state, {}));
   state.stamp = state.stamp + Duration{1};
   CHECK_FALSE(obstacleDistanceOf(*mesh, state, {}));
