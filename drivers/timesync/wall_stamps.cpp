@@ -69,7 +69,7 @@ WallStamps::Result WallStamps::map(Stamp wall, Stamp arrival, Stamp& host) {
       delay = delay + (difference_ - before);
     }
   }
-  if (size(delay) > kFarthest) {
+  if (delay > kFarthest || delay < -kMostAhead) {
     far_by_ = delay;
     return Result::kWrongClock;
   }

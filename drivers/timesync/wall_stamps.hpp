@@ -14,8 +14,8 @@
 // The decision stays open for kOpen after a step, and again after a silence, since the driver may have
 // restarted.
 //
-// A stamp more than kFarthest from its arrival is from another clock and is refused; the arrival is never
-// used instead.
+// A stamp more than kFarthest before its arrival, or more than kMostAhead after it, is from another clock and
+// is refused; the arrival is never used instead.
 //
 // Errors: values. Threads: one. O(1), no allocation. Pure: the caller reads the clocks.
 
@@ -30,6 +30,8 @@ namespace swiftlet {
 class WallStamps {
  public:
   static constexpr Duration kFarthest = Duration::fromMilliseconds(1000);
+  /// The error of two computers' clocks that NTP has synchronized.
+  static constexpr Duration kMostAhead = Duration::fromMilliseconds(50);
   /// Smaller changes are reading errors: NTP makes no smaller steps.
   static constexpr Duration kSmallestStep = Duration::fromMilliseconds(1);
   static constexpr Duration kOpen = Duration::fromMilliseconds(2000);
