@@ -37,15 +37,20 @@ std::uint16_t portOf(std::string_view text, std::string_view device, const char*
   return port;
 }
 
-/// Makes the kernel drop datagrams from other hosts before they wake a thread or fill the buffer. If it
-/// cannot, read() drops them.
-void takeOnlyFrom(int socket, in_addr_t host) {
+/// Makes the kernel drop datagrams from other hosts, or other ports of the host, before they wake a thread or
+/// fill the buffer. If it cannot, read() drops them.
+void takeOnlyFrom(int socket, const sockaddr_in& sender, bool any_port) {
   constexpr std::uint32_t kSourceAddress = 12;  // in the IPv4 header
-  std::array<sock_filter, 4> program = {
+  constexpr std::uint32_t kSourcePort = 0;      // in the UDP header, where the filter's offsets begin
+  std::array<sock_filter, 6> program = {
       sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS,
                            static_cast<std::uint32_t>(SKF_NET_OFF) + kSourceAddress),
-      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, ntohl(host), 0, 1),
-      sock_filter BPF_STMT(BPF_RET | BPF_K, 0xFFFFFFFF), sock_filter BPF_STMT(BPF_RET | BPF_K, 0)};
+      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, ntohl(sender.sin_addr.s_addr), 0, 3),
+      sock_filter BPF_STMT(BPF_LD | BPF_H | BPF_ABS, kSourcePort),
+      sock_filter BPF_JUMP(BPF_JMP | (any_port ? BPF_JGE : BPF_JEQ) | BPF_K,
+                           any_port ? 0U : ntohs(sender.sin_port), 0, 1),
+      sock_filter BPF_STMT(BPF_RET | BPF_K, 0xFFFFFFFF),
+      sock_filter BPF_STMT(BPF_RET | BPF_K, 0)};
   const sock_fprog filter = {static_cast<unsigned short>(program.size()), program.data()};
   static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof(filter)));
 }
@@ -110,19 +115,16 @@ DeviceFault LinkPort::openUdp() {
   }
   socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (socket_ < 0) return openFault(errno, "UDP socket");
-  takeOnlyFrom(socket_, peer_.sin_addr.s_addr);
+  // Without an agreed port, the other side learns our port from our datagrams and answers from the port they
+  // go to. To an agreed port, it may send from any port. The socket is not connected, which would fix our
+  // address: each datagram takes the route that there is.
+  takeOnlyFrom(socket_, peer_, udp_->own_port != 0);
   sockaddr_in own = {};
   own.sin_family = AF_INET;
   own.sin_port = htons(udp_->own_port);
   if (::bind(socket_, reinterpret_cast<const sockaddr*>(&own), sizeof(own)) != 0) {
     return deviceFault(errno == EADDRINUSE ? DeviceFaultKind::kBusy : DeviceFaultKind::kFailed, errno,
                        "UDP port %d", udp_->own_port);
-  }
-  // Without an agreed port, the other side learns our port from our datagrams and answers from the port they
-  // go to, so the socket can be connected. To an agreed port, the other side may send from any port.
-  if (udp_->own_port == 0 &&
-      ::connect(socket_, reinterpret_cast<const sockaddr*>(&peer_), sizeof(peer_)) != 0) {
-    return openFault(errno, "UDP socket");
   }
   return {};
 }
@@ -148,10 +150,9 @@ DeviceFault LinkPort::read(std::span<std::uint8_t> into, std::size_t& count, Sta
     const ssize_t got =
         ::recvfrom(socket_, into.data(), into.size(), 0, reinterpret_cast<sockaddr*>(&sender), &length);
     read_at = monotonicNow();
-    // ECONNREFUSED: ICMP answer of a host where the autopilot is not running yet. That is no fault, and more
-    // datagrams may be waiting.
-    if (got < 0 && errno != ECONNREFUSED) break;
-    if (got <= 0 || sender.sin_addr.s_addr != peer_.sin_addr.s_addr) continue;
+    if (got < 0) break;
+    const bool other_port = udp_->own_port == 0 && sender.sin_port != peer_.sin_port;
+    if (got == 0 || other_port || sender.sin_addr.s_addr != peer_.sin_addr.s_addr) continue;
     count = static_cast<std::size_t>(got);
     if (into[0] == kFrameBegin1 || into[0] == kFrameBegin2) peer_.sin_port = sender.sin_port;
     break;
@@ -187,14 +188,9 @@ DeviceFault LinkPort::write(std::span<const std::uint8_t> bytes) {
 }
 
 DeviceFault LinkPort::sendDatagram(std::span<const std::uint8_t> bytes) {
-  const auto send = [&] {
-    return ::sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&peer_),
-                    sizeof(peer_));
-  };
-  ssize_t sent = send();
-  // ECONNREFUSED answers an earlier datagram that had no receiver; this one has not been sent yet.
-  if (sent < 0 && errno == ECONNREFUSED) sent = send();
-  if (sent == static_cast<ssize_t>(bytes.size()) || errno == ECONNREFUSED) return {};
+  const ssize_t sent = ::sendto(socket_, bytes.data(), bytes.size(), 0,
+                                reinterpret_cast<const sockaddr*>(&peer_), sizeof(peer_));
+  if (sent == static_cast<ssize_t>(bytes.size())) return {};
   return deviceFault(DeviceFaultKind::kFailed, errno, "the datagram was not accepted");
 }
 

@@ -167,6 +167,16 @@ TEST_CASE("Where nobody listens yet, datagrams are lost and no fault", "[autopil
   }
 }
 
+TEST_CASE("A datagram has the address of the route that it takes, not of that at the start", "[autopilot]") {
+  LinkPort port("udp:127.0.0.1:24580", 0);
+  REQUIRE(port.open().ok());
+  REQUIRE(port.write(std::vector<std::uint8_t>{253}).ok());
+  sockaddr_in own = {};
+  socklen_t length = sizeof own;
+  REQUIRE(::getsockname(port.descriptor(), reinterpret_cast<sockaddr*>(&own), &length) == 0);
+  CHECK(own.sin_addr.s_addr == htonl(INADDR_ANY));
+}
+
 TEST_CASE("A port that another has, and a host that is none, are faults", "[autopilot]") {
   LinkPort a("udp:127.0.0.1:24574@24575", 0);
   LinkPort again("udp:127.0.0.1:24574@24575", 0);
