@@ -189,7 +189,7 @@ void Supervisor::tellArming() {
 
 void Supervisor::tellSystemd(Stamp now) {
   if (systemd_ == nullptr) return;
-  if (!std::exchange(ready_sent_, true)) systemd_->ready();
+  if (!ready_sent_) ready_sent_ = systemd_->ready();
   if (verdict_.run_failed || verdict_.ending) {
     tellEnd();
   } else {

@@ -69,7 +69,7 @@ bool SystemdNotify::send(std::string_view message) const {
   return socket_ < 0 || ::send(socket_, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
 }
 
-void SystemdNotify::ready() { send("READY=1"); }
+bool SystemdNotify::ready() const { return send("READY=1"); }
 
 bool SystemdNotify::stopping() const {
   // If systemd requested the stop, STOPPING does not disarm a watchdog that was fed since.

@@ -3,7 +3,7 @@
 // its library.
 //
 // Without NOTIFY_SOCKET in the environment, every call does nothing. Nothing blocks, allocates or fails: a
-// message that systemd does not take is lost; essential ones (the watchdog) are repeated. One thread.
+// message that systemd does not take is lost; for essential ones the call says so, or they are repeated. One thread.
 
 #include <cstdint>
 #include <optional>
@@ -23,7 +23,8 @@ class SystemdNotify {
 
   [[nodiscard]] bool wanted() const { return socket_ >= 0; }
 
-  void ready();
+  /// False: not sent, call again.
+  [[nodiscard]] bool ready() const;
   /// From here on TimeoutStopSec limits the end. Do not call watchdog() afterwards: it would arm the watchdog
   /// again. False: not sent, call again.
   [[nodiscard]] bool stopping() const;

@@ -120,7 +120,7 @@ TEST_CASE("without systemd nothing is sent", "[systemd]") {
   ::unsetenv("NOTIFY_SOCKET");
   SystemdNotify notify;
   CHECK_FALSE(notify.wanted());
-  notify.ready();
+  CHECK(notify.ready());
   notify.status("nobody listens");
   notify.watchdog(Stamp{1});
 }
@@ -128,7 +128,7 @@ TEST_CASE("without systemd nothing is sent", "[systemd]") {
 TEST_CASE("messages are those of sd_notify", "[systemd]") {
   const Listener listener("2000000");
   SystemdNotify notify;
-  notify.ready();
+  CHECK(notify.ready());
   notify.status("good");
   notify.status("good");
   notify.status("degraded");
@@ -155,8 +155,22 @@ TEST_CASE("the watchdog of another process is not ours", "[systemd]") {
 TEST_CASE("a listener that reads nothing blocks nobody", "[systemd]") {
   const Listener listener("2000000");
   SystemdNotify notify;
-  for (int i = 0; i < 10'000; ++i) notify.ready();
-  CHECK(listener.hear().size() < 10'000);
+  std::size_t taken = 0;
+  for (int i = 0; i < 10'000; ++i) taken += notify.ready() ? 1 : 0;
+  CHECK(listener.hear().size() == taken);
+  CHECK(taken < 10'000);
+}
+
+TEST_CASE("systemd hears of the start once it listens", "[systemd]") {
+  const Listener listener("2000000");
+  SystemdNotify notify;
+  while (notify.ready()) {
+  }
+  SimulatedFlight flight(true, 1, &notify);
+  flight.pass(1.0);
+  const std::size_t stuck = listener.hear().size();
+  CHECK(count(heardIn(flight, listener, 3.0), "READY=1") == 1);
+  CHECK(stuck > 0);
 }
 
 TEST_CASE("the watchdog is fed until a flight thread stands for good", "[systemd]") {
