@@ -33,7 +33,7 @@ endfunction()
 # So do the files <alone>.
 function(swiftlet_join_units target)
   file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
-  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(calibration|recorded|simulated)|firmware_host|tests)/")
+  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(bag|calibration|dds|input|recorded|simulated|v4l2)|firmware_host|tests)(/|$)")
     set(batch 20)
     if(room MATCHES "^tests/")
       set(batch 8)
