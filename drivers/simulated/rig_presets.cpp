@@ -54,14 +54,6 @@ const char* rigName(RigKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-std::optional<RigKind> rigNamed(const std::string& name) {
-  for (const RigKind kind : {RigKind::kEuroc, RigKind::kForward, RigKind::kWide, RigKind::kFisheye,
-                             RigKind::kRandomPinhole, RigKind::kRandomFisheye}) {
-    if (name == rigName(kind)) return kind;
-  }
-  return std::nullopt;
-}
-
 MountedRig makeRig(RigKind kind) {
   using std::numbers::pi;
   const auto radtan = CameraKind::kPinholeRadtan;

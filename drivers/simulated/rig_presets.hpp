@@ -1,9 +1,6 @@
 #pragma once
 // Camera rigs for simulated flights.
 
-#include <optional>
-#include <string>
-
 #include "drivers/simulated/flight_path.hpp"
 #include "estimator/camera/rig.hpp"
 
@@ -21,7 +18,6 @@ inline bool isRandom(RigKind kind) {
   return kind == RigKind::kRandomPinhole || kind == RigKind::kRandomFisheye;
 }
 const char* rigName(RigKind kind);
-std::optional<RigKind> rigNamed(const std::string& name);
 
 /// A rig, and the orientation of its body axes (the IMU's) in the airframe (forward-left-up).
 struct MountedRig {

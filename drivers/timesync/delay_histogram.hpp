@@ -18,7 +18,6 @@ class DelayHistogram {
   void add(Stamp when, Duration delay);
   /// `share` in [0, 1]; zero while empty.
   [[nodiscard]] Duration quantile(double share) const;
-  void clear() { *this = DelayHistogram(); }
 
  private:
   static constexpr Duration kGeneration = {32'000'000'000};  // same as the window of the clock maps

@@ -98,7 +98,6 @@ void TwoWayClockMap::learn(const ClockExchange& exchange) {
   const Duration trip = exchange.receive - exchange.send;
   const Duration smallest = {2 * (back_.at(exchange.remote) / 2 + forth_.at(exchange.remote) / 2)};
   round_trips_.add(exchange.receive, trip - smallest);
-  if (trip.ns > 2 * smallest.ns) ++slow_;
   ++samples_;
   was_locked_ = was_locked_ || lock() == LockState::kLocked;
 }

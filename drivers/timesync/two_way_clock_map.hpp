@@ -10,7 +10,6 @@
 //
 // The usual filter keeps only exchanges with a short round trip. Here the smallest delays in the two
 // directions need not belong to the same exchange, so a slow exchange with one quick half still helps.
-// Exchanges that take more than twice the smallest round trip are counted (`slow`): they show a loaded link.
 //
 // When the remote clock steps, one direction seems faster than possible and the other slower. If one is too
 // fast by up to 5 ms, its envelope restarts at once; the other restarts when no point comes near its line any
@@ -48,7 +47,6 @@ class TwoWayClockMap {
   [[nodiscard]] bool usable() const;
   /// Residuals: round trip above the smallest one.
   [[nodiscard]] TimesyncStatus status() const;
-  [[nodiscard]] std::uint64_t slow() const { return slow_; }
 
  private:
   Status suspect(const ClockExchange& exchange);
@@ -69,7 +67,6 @@ class TwoWayClockMap {
   std::uint64_t samples_ = 0;
   std::uint64_t resets_ = 0;
   std::uint64_t refused_ = 0;
-  std::uint64_t slow_ = 0;
   bool was_locked_ = false;
 };
 

@@ -135,7 +135,6 @@ Triangulation triangulate(Bearings bearings, Poses T_world_cam, const Triangulat
   eigen.computeDirect(errors.information, Eigen::EigenvaluesOnly);
   const Eigen::Vector3d& values = eigen.eigenvalues();
   result.condition = values[0] > 0 ? values[2] / values[0] : std::numeric_limits<double>::infinity();
-  result.rms_error = std::sqrt(errors.sum_squared / static_cast<double>(count));
   result.max_error = errors.max;
   const double first_depth = (point - T_world_cam[0].translation).norm();
   result.state = judge(result, errors, first_depth, settings);

@@ -42,7 +42,6 @@ struct Triangulation {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< world [1/m^2] for bearings of 1 rad noise
   double parallax = 0;                                    ///< [rad]
   double condition = 0;                                   ///< of `information`
-  double rms_error = 0;                                   ///< [rad]
   double max_error = 0;                                   ///< [rad]
 
   [[nodiscard]] bool valid() const { return state == TriangulationState::kValid; }

@@ -173,10 +173,7 @@ void PlaneTies::addPlanes(Smoother& smoother) {
     }
     const std::optional<PlaneId> id =
         held_.full() ? std::nullopt : smoother.addPlane(Plane(reported.normal, reported.distance));
-    if (!id) {
-      ++counters_.planes_refused;
-      continue;
-    }
+    if (!id) continue;  // no room
     plane.id = *id;
     static_cast<void>(smoother.addPlaneDirection(*id, reported.direction, kDirectionSigma));
     held_.pushBack(plane);

@@ -30,7 +30,6 @@ struct PlaneTieCounters {
   std::uint64_t reports = 0;          ///< applied
   std::uint64_t reports_ignored = 0;  ///< of another epoch, or not newer than the last
   std::uint64_t planes_added = 0;
-  std::uint64_t planes_refused = 0;  ///< because there was no room
   std::uint64_t points_tied = 0;
   std::uint64_t points_refused = 0;  ///< by the test before tying
   std::uint64_t points_untied = 0;   ///< by the test after a solve, or because the mesher dropped them

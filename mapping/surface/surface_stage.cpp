@@ -104,7 +104,6 @@ void SurfaceStage::beforeRemoval(const VoxelVolume& volume, std::span<const std:
           const std::uint32_t near = volume.find(index + BlockIndex{x, y, z});
           if (near == VoxelVolume::kNone || is_old_[near] == 0) continue;
           draw(near);
-          ++counters_.drawn_before_removal;
         }
       }
     }

@@ -33,7 +33,6 @@ struct SurfaceStep {
 
 struct SurfaceCounters {
   std::uint64_t drawn = 0;
-  std::uint64_t drawn_before_removal = 0;
 };
 
 /// Draws the whole surface in one step.
