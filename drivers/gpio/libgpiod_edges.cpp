@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <ctime>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "drivers/gpio/edge_source.hpp"
 
 namespace swiftlet {
@@ -21,11 +22,7 @@ std::int64_t nanoseconds(const timespec& t) {
 }
 
 /// Whether a stamp is in CLOCK_REALTIME, as of kernels before 5.7: it is decades ahead of CLOCK_MONOTONIC.
-bool inRealtime(Stamp stamp) {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return stamp.ns > nanoseconds(now) + kSecond;
-}
+bool inRealtime(Stamp stamp) { return stamp > monotonicNow() + Duration{kSecond}; }
 
 }  // namespace
 

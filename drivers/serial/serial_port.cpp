@@ -11,20 +11,14 @@
 #include <cerrno>
 #include <climits>
 #include <cstdlib>
-#include <ctime>
 #include <string_view>
 #include <utility>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/baud_rate.hpp"
 
 namespace swiftlet {
 namespace {
-
-Stamp now() {
-  timespec time = {};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return Stamp{static_cast<std::int64_t>(time.tv_sec) * 1'000'000'000 + time.tv_nsec};
-}
 
 /// Rounded up, so that a wait below a millisecond is not zero.
 int pollMilliseconds(Duration duration) {
@@ -114,7 +108,7 @@ DeviceFault SerialPort::read(std::span<std::uint8_t> into, std::size_t& count, S
   if (descriptor_ < 0) return unplugged(0);
   const ssize_t got = ::read(descriptor_, into.data(), into.size());
   const int error = errno;
-  read_at = now();
+  read_at = monotonicNow();
   if (got > 0) {
     count = static_cast<std::size_t>(got);
     return {};
@@ -153,14 +147,14 @@ DeviceFault SerialPort::writeSome(std::span<const std::uint8_t> bytes, std::size
 }
 
 DeviceFault SerialPort::write(std::span<const std::uint8_t> bytes, Duration most) {
-  const Stamp until = now() + most;
+  const Stamp until = monotonicNow() + most;
   // Bounded: each turn sends at least one byte, waits, or ends.
   while (!bytes.empty()) {
     std::size_t taken = 0;
     if (const DeviceFault fault = writeSome(bytes, taken); !fault.ok()) return fault;
     bytes = bytes.subspan(taken);
     if (taken > 0) continue;
-    const Duration left = until - now();
+    const Duration left = until - monotonicNow();
     if (left <= Duration{})
       return deviceFault(DeviceFaultKind::kFailed, 0, "%zu bytes not accepted in time", bytes.size());
     pollfd asked = {descriptor_, POLLOUT, 0};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "estimator/core/units.hpp"
 #include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
@@ -104,7 +105,8 @@ void CameraThread::noteWarnings() {
   const std::span<const DeviceFault> warnings = source_->warnings();
   for (const DeviceFault& warning : warnings) {
     const auto same = [&](const DeviceFault& before) { return before.text() == warning.text(); };
-    if (std::ranges::none_of(std::span(said_).first(said_count_), same)) journal_.note(hostNow(), warning);
+    if (std::ranges::none_of(std::span(said_).first(said_count_), same))
+      journal_.note(monotonicNow(), warning);
   }
   said_count_ = warnings.size();
   std::ranges::copy(warnings, said_.begin());
@@ -149,23 +151,23 @@ DeviceFault CameraThread::reopen() {
 
 void CameraThread::run(SensorSink& sink, const RunControl& control) {
   discard();
-  newest_ = hostNow();
+  newest_ = monotonicNow();
   while (!control.stopped()) {
     heart_.beat();
     takeEdges();
     if (!source_->isOpen()) {
       if (const DeviceFault fault = reopen(); !fault.ok()) {
-        journal_.fault(hostNow(), fault);
+        journal_.fault(monotonicNow(), fault);
         sleepFor(kReopenPeriod);
         continue;
       }
-      newest_ = hostNow();
+      newest_ = monotonicNow();
     }
     pollfd waiting{source_->fd(), POLLIN, 0};
     poll(&waiting, 1, kPollMilliseconds);
     takeFrames(sink);
     publish();
-    const Stamp now = hostNow();
+    const Stamp now = monotonicNow();
     for (DeviceFault remark; source_->nextRemark(remark);) journal_.note(now, remark);
     watchSilence(now);
   }
@@ -211,7 +213,7 @@ void CameraThread::takeFrames(SensorSink& sink) {
   for (int i = 0; i < kMostFrames; ++i) {
     CapturedFrame frame;
     if (const DeviceFault fault = source_->next(frame); !fault.ok()) {
-      journal_.fault(hostNow(), fault);
+      journal_.fault(monotonicNow(), fault);
       return;
     }
     if (!frame.valid()) return;
@@ -297,7 +299,7 @@ void CameraThread::take(const CapturedFrame& frame, SensorSink& sink) {
     ++undecoded_;
     return;
   }
-  newest_ = hostNow();
+  newest_ = monotonicNow();
   restart_at_ = {};
   restart_wait_ = kFirstRestartWait;
   if (exposure_) timing_.exposure = exposure_->inForce(frame.sequence).exposure;

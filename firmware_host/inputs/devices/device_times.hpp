@@ -1,9 +1,8 @@
 #pragma once
-// Common to the threads of devices: waiting times, and the host's clock as a Stamp.
+// Common to the threads of devices: waiting times, and stamps in seconds.
 
 #include <algorithm>
 
-#include "drivers/device/monotonic_now.hpp"
 #include "estimator/core/stamp.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 
@@ -26,8 +25,6 @@ inline Duration longestSilence(double rate) {
   return std::max(kLongestSilence, Duration::fromSeconds(kPeriods / rate));
 }
 
-/// CLOCK_MONOTONIC.
-inline Stamp hostNow() { return monotonicNow(); }
 inline double secondsOf(Stamp stamp) { return (stamp - Stamp{}).seconds(); }
 
 }  // namespace swiftlet

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 
@@ -53,7 +54,7 @@ void ImuThread::run(SensorSink& sink, const ImuEdges& edges, const RunControl& c
     heart_.beat();
     if (!link_->isOpen()) {
       if (const DeviceFault fault = link_->open(); !fault.ok()) {
-        journal_.fault(hostNow(), fault);
+        journal_.fault(monotonicNow(), fault);
         sleepFor(kReopenPeriod);
         continue;
       }
@@ -61,7 +62,7 @@ void ImuThread::run(SensorSink& sink, const ImuEdges& edges, const RunControl& c
     }
     std::array<pollfd, 2> waiting = {{{link_->fd(), POLLIN, 0}, {link_->wakeFd(), POLLIN, 0}}};
     poll(waiting.data(), waiting.size(), kPollMilliseconds);
-    const Stamp now = hostNow();
+    const Stamp now = monotonicNow();
     DeviceFault fault = link_->receive(now);
     takeReadings(sink, edges);
     if (fault.ok()) fault = link_->send();
@@ -91,7 +92,7 @@ void ImuThread::takeReadings(SensorSink& sink, const ImuEdges& edges) {
     const std::optional<Stamp> stamp = hostOf(edge.device);
     if (!stamp) continue;
     ++counted_.edges;
-    counted_.edge = hostNow();
+    counted_.edge = monotonicNow();
     for (EdgeRing* ring : edges.cameras) static_cast<void>(ring->tryPush({*stamp, edge.counter}));
   }
   if (readings == 0) return;
@@ -103,7 +104,7 @@ void ImuThread::takeReadings(SensorSink& sink, const ImuEdges& edges) {
 }
 
 void ImuThread::hear() {
-  heard_ = hostNow();
+  heard_ = monotonicNow();
   received_ = link_->received();
   refused_ = counted_.refused;
 }

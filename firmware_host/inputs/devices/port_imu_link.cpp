@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "firmware_host/inputs/devices/device_times.hpp"
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 
 namespace swiftlet {
@@ -82,7 +82,7 @@ DeviceFault PortImuLink::judge(const DeviceFault& fault) {
 DeviceFault PortImuLink::send() {
   if (!isMavlink() || !port_.isOpen()) return {};
   std::array<std::uint8_t, AutopilotDialogue::kMostBytes> said;
-  const std::size_t length = dialogue_.step(decoder_, hostNow(), said);
+  const std::size_t length = dialogue_.step(decoder_, monotonicNow(), said);
   if (length > 0) {
     if (const DeviceFault fault = judge(port_.write(std::span(said).first(length))); !fault.ok())
       return fault;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "firmware_host/inputs/devices/device_times.hpp"
+#include "drivers/device/monotonic_now.hpp"
 
 namespace swiftlet {
 namespace {
@@ -56,8 +56,8 @@ void SensorSetup::run(LinkPort& port, ImuDecoder& decoder) {
 double SensorSetup::listen(LinkPort& port, ImuDecoder& decoder) {
   Stamp first, last;
   int readings = 0;
-  const Stamp end = hostNow() + kListening;
-  while (hostNow() < end) {
+  const Stamp end = monotonicNow() + kListening;
+  while (monotonicNow() < end) {
     port.wait(kRound);
     std::size_t count = 0;
     Stamp read_at;
@@ -75,8 +75,8 @@ double SensorSetup::listen(LinkPort& port, ImuDecoder& decoder) {
 bool SensorSetup::ask(LinkPort& port, const ConfigurationStep& step) {
   count_ = reply_ = 0;
   if (!port.write(std::span<const std::uint8_t>(step.bytes.data(), step.bytes.size())).ok()) return false;
-  const Stamp end = hostNow() + kPatience;
-  while (hostNow() < end) {
+  const Stamp end = monotonicNow() + kPatience;
+  while (monotonicNow() < end) {
     port.wait(kRound);
     // Readings that keep arriving push older bytes out.
     if (count_ > heard_.size() / 2) {

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/realtime/host_sleep.hpp"
 
@@ -24,27 +25,27 @@ TriggerThread::TriggerThread(const TriggerGroup& settings, double rate)
 }
 
 void TriggerThread::run(std::span<EdgeRing* const> cameras, const RunControl& control) {
-  heard_ = hostNow();
+  heard_ = monotonicNow();
   while (!control.stopped()) {
     heart_.beat();
     if (!source_.isOpen()) {
       if (const DeviceFault fault = open(); !fault.ok()) {
-        journal_.fault(hostNow(), fault);
+        journal_.fault(monotonicNow(), fault);
         sleepFor(kReopenPeriod);
         continue;
       }
-      heard_ = hostNow();
+      heard_ = monotonicNow();
     }
     pollfd waiting{source_.fd(), POLLIN, 0};
     poll(&waiting, 1, kPollMilliseconds);
     std::array<EdgeEvent, 16> events;
     std::size_t count = 0;
     if (const DeviceFault fault = source_.read(events, count); !fault.ok()) {
-      journal_.fault(hostNow(), fault);
+      journal_.fault(monotonicNow(), fault);
       source_.close();
       continue;
     }
-    const Stamp now = hostNow();
+    const Stamp now = monotonicNow();
     for (const EdgeEvent& event : std::span(events).first(count)) {
       number_ = event.sequence ? *event.sequence : number_ + 1;
       for (EdgeRing* camera : cameras) static_cast<void>(camera->tryPush({event.stamp, number_}));

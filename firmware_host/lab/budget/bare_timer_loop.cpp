@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <ctime>
 
+#include "drivers/device/monotonic_now.hpp"
+
 namespace swiftlet {
 namespace {
 
 constexpr std::int64_t kNanosPerSecond = 1'000'000'000;
-
-Stamp now() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return {time.tv_sec * kNanosPerSecond + time.tv_nsec};
-}
 
 void sleepUntil(Stamp stamp) {
   const timespec time{stamp.ns / kNanosPerSecond, stamp.ns % kNanosPerSecond};
@@ -39,10 +35,10 @@ void BareTimerLoop::stop() {
 }
 
 void BareTimerLoop::loop() {
-  Stamp due = now() + period_;
+  Stamp due = monotonicNow() + period_;
   while (!stop_.load(std::memory_order_relaxed)) {
     sleepUntil(due);
-    const Duration late = now() - due;
+    const Duration late = monotonicNow() - due;
     lateness_.add(late.seconds());
     const std::int64_t missed = late.ns / period_.ns;
     skipped_ += static_cast<std::uint64_t>(missed);

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <memory>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "drivers/recorded/open_log.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "estimator/core/units.hpp"
@@ -199,7 +200,7 @@ class HilRun {
                          "Play a log of synchronized cameras");
       }
     }
-    const Stamp earliest = hostNow() + Duration::fromSeconds(request_.lead + 2 * grid_.period.seconds());
+    const Stamp earliest = monotonicNow() + Duration::fromSeconds(request_.lead + 2 * grid_.period.seconds());
     grid_.first = Stamp{(earliest.ns / grid_.period.ns + 1) * grid_.period.ns};
     // From the log's list of images.
     last_slot_ = static_cast<std::int64_t>(source_->frameCount()) - 1;
@@ -207,7 +208,7 @@ class HilRun {
       last_slot_ =
           std::min(last_slot_, static_cast<std::int64_t>(request_.seconds * settings_.cameras.rate_hz));
     }
-    for (const auto& camera : cameras_) camera->begin(grid_, hostNow(), last_slot_);
+    for (const auto& camera : cameras_) camera->begin(grid_, monotonicNow(), last_slot_);
     trigger_.begin(grid_, last_slot_);
     imu_->begin(grid_, grid_.first_log + Duration{(last_slot_ + 1) * grid_.period.ns});
   }
@@ -227,17 +228,17 @@ class HilRun {
 
   bool play() {
     const Stamp end = grid_.instant(last_slot_ + kSlotsBehind);
-    for (Stamp now = hostNow(); now < end; now = hostNow()) {
+    for (Stamp now = monotonicNow(); now < end; now = monotonicNow()) {
       if (stopped()) return false;
       if (broke(imu_->step(now), settings_.imu_link.device)) return false;
       trigger_.step(now);
       for (std::size_t c = 0; c < cameras_.size(); ++c) {
-        if (broke(cameras_[c]->step(hostNow()), fmt::format("camera {}'s output", c))) return false;
+        if (broke(cameras_[c]->step(monotonicNow()), fmt::format("camera {}'s output", c))) return false;
       }
-      Stamp next = hostNow() + kLook;
+      Stamp next = monotonicNow() + kLook;
       if (const auto due = imu_->due()) next = std::min(next, *due);
       if (const auto due = trigger_.due()) next = std::min(next, *due);
-      if (next > hostNow()) sleepUntil(secondsOf(next));
+      if (next > monotonicNow()) sleepUntil(secondsOf(next));
     }
     return true;
   }

@@ -10,10 +10,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <string>
 #include <vector>
 
 #include "drivers/can/raw_imu.hpp"
+#include "drivers/device/monotonic_now.hpp"
 #include "tests/drivers/can/flight.hpp"
 #include "tests/drivers/recorded/recording_allocations.hpp"
 #include "tests/support/sandbox.hpp"
@@ -28,12 +30,6 @@ CanBusSettings settings() {
   CanBusSettings s;
   s.setInterface(sandbox::device("SANDBOX_CAN").c_str());
   return s;
-}
-
-Stamp monotonicNow() {
-  timespec now = {};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return {now.tv_sec * 1'000'000'000 + now.tv_nsec};
 }
 
 void sleepUntil(Stamp stamp) {

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "firmware_host/inputs/devices/camera_thread.hpp"
-#include "firmware_host/inputs/devices/device_times.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 
 namespace swiftlet {
@@ -157,7 +157,7 @@ class StallingCamera : public GreyCamera {
   [[nodiscard]] bool isOpen() const override { return open_; }
   DeviceFault next(CapturedFrame& frame) override {
     frame.release();
-    if (open_ && !stalls.load() && asked_++ % 2 == 0) give(frame, hostNow());
+    if (open_ && !stalls.load() && asked_++ % 2 == 0) give(frame, monotonicNow());
     return {};
   }
 

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <thread>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/imu_encoder.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
 #include "estimator/core/random.hpp"
-#include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/inputs/devices/port_imu_link.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
@@ -51,7 +51,7 @@ class FarSensor {
   /// Readings at the sensor's rate, sensed when they are sent.
   void send(int count) {
     for (int i = 0; i < count; ++i) {
-      sendOne(hostNow() + offset);
+      sendOne(monotonicNow() + offset);
       std::this_thread::sleep_for(std::chrono::nanoseconds(kReadingPeriod.ns));
     }
   }
@@ -228,8 +228,9 @@ TEST_CASE("a sensor that is unplugged is told gone once, and taken up when it re
   CHECK(running.linesWith("not there") == 0);
   CHECK(running.linesWith("works again") == 0);
 
-  sensor.offset = Duration::fromMilliseconds(77) - Duration{hostNow().ns};  // it was switched off meanwhile
-  const Stamp back = hostNow();
+  sensor.offset =
+      Duration::fromMilliseconds(77) - Duration{monotonicNow().ns};  // it was switched off meanwhile
+  const Stamp back = monotonicNow();
   sensor.plugIn();
   const std::size_t before = sink.count();
   REQUIRE(soon([&] {
@@ -308,12 +309,12 @@ TEST_CASE("a clock that steps costs tenths of a second, and no stamp of the futu
     INFO("step of " << step_ms << " ms");
     sensor.offset = sensor.offset + Duration::fromMilliseconds(step_ms);
     const std::size_t before = sink.count();
-    const Stamp begin = hostNow();
+    const Stamp begin = monotonicNow();
     REQUIRE(soon([&] {
       sensor.send(1);
       return sink.count() > before + 50;
     }));
-    CHECK(hostNow() - begin < Duration::fromMilliseconds(3000));
+    CHECK(monotonicNow() - begin < Duration::fromMilliseconds(3000));
     for (std::size_t i = before; i < sink.count(); ++i) {
       CHECK(sink[i].sample.stamp <= sink[i].arrival);
       CHECK(sink[i].arrival - sink[i].sample.stamp < Duration::fromMilliseconds(1000));
@@ -330,7 +331,7 @@ TEST_CASE("a clock that stands still is told: its samples are all refused") {
   ImuThread imu = threadOf(sensor);
   REQUIRE(imu.open().ok());
   RunningImu running(imu, sink);
-  const Stamp still = hostNow() + sensor.offset;
+  const Stamp still = monotonicNow() + sensor.offset;
   REQUIRE(soon([&] {
     sensor.sendOne(still);
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -356,14 +357,14 @@ TEST_CASE("an autopilot's readings come by UDP, and a flood of datagrams is slow
     std::array<std::uint8_t, ImuEncoder::kLongestFrame> frame;
     REQUIRE(autopilot.write(std::span(frame).first(encoder.encode(reading, frame))).ok());
   }
-  const Stamp begin = hostNow();
+  const Stamp begin = monotonicNow();
   int readings = 0;
   REQUIRE(soon([&] {
-    for (int i = 0; i < 50; ++i) CHECK(link.receive(hostNow()).ok());
+    for (int i = 0; i < 50; ++i) CHECK(link.receive(monotonicNow()).ok());
     for (ImuReading reading; link.next(reading);) ++readings;
     return readings == kReadings;
   }));
-  CHECK(hostNow() - begin >= Duration::fromMilliseconds(kReadings / 64));
+  CHECK(monotonicNow() - begin >= Duration::fromMilliseconds(kReadings / 64));
 }
 
 }  // namespace

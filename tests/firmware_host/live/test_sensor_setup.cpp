@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/device/monotonic_now.hpp"
 #include "drivers/serial/imu_encoder.hpp"
 #include "drivers/serial/pseudo_terminal.hpp"
-#include "firmware_host/inputs/devices/device_times.hpp"
 #include "firmware_host/inputs/devices/port_imu_link.hpp"
 #include "tests/firmware_host/live/imu_bench.hpp"
 
@@ -53,7 +53,7 @@ class ScriptedSensor {
 
  private:
   void run() {
-    Stamp next = hostNow();
+    Stamp next = monotonicNow();
     std::string heard;
     while (!stop_.load()) {
       if (const double factory = factory_.exchange(-1); factory >= 0) rate_ = factory;
@@ -70,14 +70,14 @@ class ScriptedSensor {
         if (script.rate >= 0) rate_ = script.rate;
         break;
       }
-      for (; rate_ > 0 && next <= hostNow(); next = next + Duration::fromSeconds(1 / rate_)) {
+      for (; rate_ > 0 && next <= monotonicNow(); next = next + Duration::fromSeconds(1 / rate_)) {
         ImuReading reading;
         reading.device = next;
         reading.gyro = reading.accel = Eigen::Vector3d(0.5, 0.25, 0.125);
         std::array<std::uint8_t, ImuEncoder::kLongestFrame> frame;
         static_cast<void>(terminal_.send(std::span(frame).first(encoder_.encode(reading, frame)), taken));
       }
-      if (rate_ <= 0) next = hostNow();
+      if (rate_ <= 0) next = monotonicNow();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
@@ -109,7 +109,7 @@ Opened open(const ScriptedSensor& sensor, const char* protocol, double rate) {
   // Readings come as if nothing had been asked.
   std::size_t readings = 0;
   for (int i = 0; i < 2000 && readings < 5; ++i) {
-    REQUIRE(link.receive(hostNow()).ok());
+    REQUIRE(link.receive(monotonicNow()).ok());
     for (ImuReading reading; link.next(reading);) ++readings;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
