@@ -1,11 +1,20 @@
 #include "drivers/recorded/log_messages.hpp"
 
-#include <string>
-
 namespace swiftlet {
 namespace {
 
-rosmsg::Header headerOf(Stamp stamp, const std::string& frame) {
+template <typename Image>
+void writeImage(MessageBag& bag, std::size_t camera, Stamp stamp, const char* tail, Image&& image,
+                rosmsg::CameraInfo& info) {
+  const std::string name = cameraName(camera);
+  image.header = info.header = bagHeader(stamp, name);
+  bag.write("/" + name + "/image_raw" + tail, stamp, image);
+  bag.write("/" + name + "/camera_info", stamp, info);
+}
+
+}  // namespace
+
+rosmsg::Header bagHeader(Stamp stamp, const std::string& frame) {
   rosmsg::Header header;
   header.stamp = stamp;
   header.frame_id = frame;
@@ -13,17 +22,6 @@ rosmsg::Header headerOf(Stamp stamp, const std::string& frame) {
 }
 
 std::string cameraName(std::size_t camera) { return "cam" + std::to_string(camera); }
-
-template <typename Image>
-void writeImage(MessageBag& bag, std::size_t camera, Stamp stamp, const char* tail, Image&& image,
-                rosmsg::CameraInfo& info) {
-  const std::string name = cameraName(camera);
-  image.header = info.header = headerOf(stamp, name);
-  bag.write("/" + name + "/image_raw" + tail, stamp, image);
-  bag.write("/" + name + "/camera_info", stamp, info);
-}
-
-}  // namespace
 
 rosmsg::CameraInfo cameraInfoOf(const CameraModel& model) {
   rosmsg::CameraInfo info;
@@ -41,7 +39,7 @@ rosmsg::CameraInfo cameraInfoOf(const CameraModel& model) {
 
 void writeImu(MessageBag& bag, const ImuSample& sample) {
   rosmsg::Imu imu;
-  imu.header = headerOf(sample.stamp, "imu0");
+  imu.header = bagHeader(sample.stamp, "imu0");
   imu.angular_velocity = {sample.gyro.x(), sample.gyro.y(), sample.gyro.z()};
   imu.linear_acceleration = {sample.accel.x(), sample.accel.y(), sample.accel.z()};
   bag.write("/imu0", sample.stamp, imu);

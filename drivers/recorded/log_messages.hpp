@@ -5,13 +5,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "drivers/bag/message_bag.hpp"
+#include "drivers/bag/ros_messages.hpp"
 #include "estimator/camera/camera_model.hpp"
+#include "estimator/core/stamp.hpp"
 #include "estimator/messages/imu_sample.hpp"
 
 namespace swiftlet {
 
+[[nodiscard]] rosmsg::Header bagHeader(Stamp stamp, const std::string& frame);
+/// "cam0", "cam1", ...: the camera's frame and the first part of its topics.
+[[nodiscard]] std::string cameraName(std::size_t camera);
 /// `plumb_bob` or `equidistant`, unrectified.
 [[nodiscard]] rosmsg::CameraInfo cameraInfoOf(const CameraModel& model);
 

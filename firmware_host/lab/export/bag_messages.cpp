@@ -7,6 +7,7 @@
 #include <cstring>
 #include <vector>
 
+#include "drivers/recorded/log_messages.hpp"
 #include "estimator/messages/names.hpp"
 #include "firmware_host/outputs/map_files/map_files.hpp"
 
@@ -70,13 +71,6 @@ void add(rosmsg::DiagnosticStatus& status, const char* key, const std::string& v
 }
 
 }  // namespace
-
-rosmsg::Header bagHeader(Stamp stamp, const std::string& frame) {
-  rosmsg::Header header;
-  header.stamp = stamp;
-  header.frame_id = frame;
-  return header;
-}
 
 rosmsg::PoseStamped bagPose(Stamp stamp, const std::string& frame, const SE3& T_frame_body) {
   rosmsg::PoseStamped pose;

@@ -10,7 +10,6 @@
 
 namespace swiftlet {
 
-rosmsg::Header bagHeader(Stamp stamp, const std::string& frame);
 rosmsg::PoseStamped bagPose(Stamp stamp, const std::string& frame, const SE3& T_frame_body);
 rosmsg::TransformStamped bagTransform(Stamp stamp, const std::string& frame, const std::string& child,
                                       const SE3& T_frame_child);

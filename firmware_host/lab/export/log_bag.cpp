@@ -14,8 +14,6 @@ namespace {
 
 constexpr Stamp kNever{std::numeric_limits<std::int64_t>::max()};
 
-std::string cameraName(std::size_t camera) { return fmt::format("cam{}", camera); }
-
 }  // namespace
 
 LogBag::LogBag(LogSource& log, const LogBagOptions& options, MessageBag& bag)
