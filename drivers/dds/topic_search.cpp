@@ -1,27 +1,11 @@
 #include "drivers/dds/topic_search.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
+#include "drivers/input/edit_distance.hpp"
+
 namespace swiftlet {
-namespace {
-
-/// Number of letters to insert, delete or replace (Levenshtein).
-std::size_t editDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = std::exchange(row[j + 1], std::min({replaced, row[j] + 1, row[j + 1] + 1}));
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
 
 std::string missingTopic(std::span<const PublishedTopic> published, std::string_view type,
                          std::string_view name) {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <vector>
 
+#include "drivers/input/edit_distance.hpp"
 #include "estimator/core/limits.hpp"
 #include "firmware_host/settings/setting_makers.hpp"
 
@@ -298,22 +298,6 @@ std::vector<Setting> makeRegistry() {
     all.insert(all.end(), group.begin(), group.end());
   }
   return all;
-}
-
-/// Levenshtein distance.
-std::size_t editDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
 }
 
 /// The text in YAML's single quotes: quotes inside are doubled, nothing else is special.
