@@ -173,4 +173,14 @@ std::vector<PublishedTopic> DdsDomain::publishedTopics() const {
 
 std::uint64_t DdsDomain::complaints() { return allComplaints().lines.load(std::memory_order_relaxed); }
 
+dds_qos* topicQuality(bool reliable, int kept) {
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
+  dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
+  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kept);
+  dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
+  dds_qset_data_representation(qos, 1, &plain);
+  return qos;
+}
+
 }  // namespace swiftlet

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <vector>
 
+struct dds_qos;
+
 namespace swiftlet {
 
 inline constexpr std::size_t kLargestMessage = std::size_t{16} * 1024 * 1024;
@@ -54,5 +56,9 @@ class DdsDomain {
   std::int32_t domain_ = 0;
   std::int32_t participant_ = 0;
 };
+
+/// Quality of service as in ROS 2: reliable or best effort, volatile, the last `kept` messages; writers never
+/// wait. Delete it with dds_delete_qos().
+[[nodiscard]] dds_qos* topicQuality(bool reliable, int kept);
 
 }  // namespace swiftlet

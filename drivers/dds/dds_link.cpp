@@ -56,17 +56,6 @@ void lend(Sequence& sequence, std::vector<Item>& items) {
   sequence._release = false;
 }
 
-/// Quality of service as in ROS 2: reliable or best effort, volatile, the last `kept`; writers never wait.
-dds_qos_t* quality(bool reliable, int kept) {
-  dds_qos_t* qos = dds_create_qos();
-  dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
-  dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kept);
-  dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
-  dds_qset_data_representation(qos, 1, &plain);
-  return qos;
-}
-
 /// False: the image does not have 8 bits, or has less data than declared.
 bool copyImage(const sensor_msgs_msg_dds__Image_& from, DdsImage& image) {
   const std::string_view encoding = from.encoding;
@@ -135,7 +124,7 @@ struct DdsLink::Entities {
     return topic;
   }
   [[nodiscard]] dds_entity_t writer(const dds_topic_descriptor_t& type, const std::string& name, int kept) {
-    dds_qos_t* qos = quality(true, kept);
+    dds_qos_t* qos = topicQuality(true, kept);
     const dds_entity_t writer = dds_create_writer(domain->participant(), topic(type, name), qos, nullptr);
     dds_delete_qos(qos);
     if (writer > 0) made.push_back(writer);
@@ -143,7 +132,7 @@ struct DdsLink::Entities {
   }
   [[nodiscard]] dds_entity_t reader(const dds_topic_descriptor_t& type, const std::string& name) {
     // Best effort matches both kinds of writers, and no writer waits for this reader.
-    dds_qos_t* qos = quality(false, kKeptImages);
+    dds_qos_t* qos = topicQuality(false, kKeptImages);
     dds_listener_t* listener = dds_create_listener(&images_came);
     dds_lset_data_available(listener, [](dds_entity_t, void* came) {
       static_cast<std::atomic<std::uint64_t>*>(came)->fetch_add(1, std::memory_order_relaxed);

@@ -35,16 +35,6 @@ Eigen::Vector3d vectorOf(const geometry_msgs_msg_dds__Vector3_& v) { return {v.x
 
 std::string_view textOf(const char* text) { return text != nullptr ? text : ""; }
 
-dds_qos_t* bestEffort(int kept) {
-  dds_qos_t* qos = dds_create_qos();
-  dds_qset_reliability(qos, DDS_RELIABILITY_BEST_EFFORT, 0);
-  dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, kept);
-  dds_data_representation_id_t plain = DDS_DATA_REPRESENTATION_XCDR1;
-  dds_qset_data_representation(qos, 1, &plain);
-  return qos;
-}
-
 }  // namespace
 
 struct TopicReader::Entities {
@@ -109,7 +99,7 @@ bool TopicReader::open(std::shared_ptr<DdsDomain> domain, TopicType type, const 
   const bool images = type == TopicType::kImage || type == TopicType::kCompressedImage;
   const int kept = images ? kKeptImages : kKeptSamples;
   e.kept = static_cast<std::uint64_t>(kept);
-  dds_qos_t* qos = bestEffort(kept);
+  dds_qos_t* qos = topicQuality(false, kept);
   dds_listener_t* listener = dds_create_listener(&e);
   dds_lset_data_available(listener, [](dds_entity_t, void* to) {
     auto& entities = *static_cast<Entities*>(to);
