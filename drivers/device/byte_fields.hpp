@@ -1,5 +1,5 @@
 #pragma once
-// Reads and writes the numbers of a message field by field, in either byte order, on any machine.
+// Reads and writes the numbers of a message or a file field by field, in either byte order, on any machine.
 //
 // Safe for any length: reading past the end gives zeros, writing past it writes nothing, and ok() is false
 // afterwards. No allocation; the bytes belong to the caller.
@@ -9,6 +9,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 
 namespace swiftlet {
@@ -82,7 +83,8 @@ class FieldWriter {
   void u16(std::uint16_t value) { put<2>(value); }
   void u32(std::uint32_t value) { put<4>(value); }
   void u64(std::uint64_t value) { put<8>(value); }
-  void i64(std::int64_t value) { put<8>(static_cast<std::uint64_t>(value)); }
+  void i32(std::int32_t value) { u32(static_cast<std::uint32_t>(value)); }
+  void i64(std::int64_t value) { u64(static_cast<std::uint64_t>(value)); }
   void f32(float value) { u32(std::bit_cast<std::uint32_t>(value)); }
   void f64(double value) { u64(std::bit_cast<std::uint64_t>(value)); }
   /// Three f32, rounded to nearest.
@@ -90,7 +92,11 @@ class FieldWriter {
     for (int i = 0; i < 3; ++i) f32(static_cast<float>(value[i]));
   }
   void copy(std::span<const std::uint8_t> bytes) {
-    for (const std::uint8_t byte : bytes) u8(byte);
+    const std::span<std::uint8_t> to = take(bytes.size());
+    if (!to.empty()) std::memcpy(to.data(), bytes.data(), to.size());
+  }
+  void zeros(std::size_t count) {
+    for (std::uint8_t& byte : take(count)) byte = 0;
   }
 
   /// The bytes written so far.
@@ -99,6 +105,15 @@ class FieldWriter {
   [[nodiscard]] bool ok() const { return !failed_; }
 
  private:
+  /// The next `count` bytes; empty if they do not fit.
+  std::span<std::uint8_t> take(std::size_t count) {
+    if (count > bytes_.size() - at_) {
+      failed_ = true;
+      return {};
+    }
+    at_ += count;
+    return bytes_.subspan(at_ - count, count);
+  }
   template <std::size_t kSize>
   void put(std::uint64_t value) {
     if (kSize > bytes_.size() - at_) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 
 namespace swiftlet {
@@ -63,30 +64,30 @@ bool parseSegmentName(const std::string& name, std::uint32_t& segment) {
 std::uint32_t runChecksum(const RunId& run) { return crc32c(0, run); }
 
 void encode(const SegmentHeader& header, std::span<std::uint8_t, kSegmentHeaderBytes> out) {
-  LittleEndianWriter to(out.data());
-  to.bytes(kSegmentMagic);
+  LittleFieldWriter to(out);
+  to.copy(kSegmentMagic);
   to.u32(header.version);
   to.u32(header.segment);
-  to.bytes(header.run);
+  to.copy(header.run);
   to.u64(header.first_sequence);
-  to.zeros(kSegmentChecksumAt - to.written());
+  to.zeros(kSegmentChecksumAt - to.written().size());
   to.u32(crc32c(0, out.first(kSegmentChecksumAt)));
 }
 
 void encode(const RecordHeader& header, std::uint32_t run_checksum,
             std::span<std::uint8_t, kRecordHeaderBytes> out) {
-  LittleEndianWriter to(out.data());
+  LittleFieldWriter to(out);
   to.u32(0);
   to.u32(header.payload_crc);
   to.u64(header.sequence);
   to.u32(header.length);
   to.u16(static_cast<std::uint16_t>(header.kind));
   to.u16(kRecordMark);
-  LittleEndianWriter(out.data()).u32(crc32c(run_checksum, out.subspan(sizeof(std::uint32_t))));
+  LittleFieldWriter(out).u32(crc32c(run_checksum, out.subspan(sizeof(std::uint32_t))));
 }
 
 SegmentHeaderState decode(std::span<const std::uint8_t, kSegmentHeaderBytes> in, SegmentHeader& header) {
-  LittleEndianReader from(in);
+  LittleFieldReader from(in);
   const std::span<const std::uint8_t> magic = from.bytes(kSegmentMagic.size());
   if (!std::equal(magic.begin(), magic.end(), kSegmentMagic.begin())) return SegmentHeaderState::kForeign;
   header.version = from.u32();
@@ -94,14 +95,14 @@ SegmentHeaderState decode(std::span<const std::uint8_t, kSegmentHeaderBytes> in,
   const std::span<const std::uint8_t> run = from.bytes(header.run.size());
   std::copy(run.begin(), run.end(), header.run.begin());
   header.first_sequence = from.u64();
-  const std::uint32_t stated = LittleEndianReader(in.subspan(kSegmentChecksumAt)).u32();
+  const std::uint32_t stated = LittleFieldReader(in.subspan(kSegmentChecksumAt)).u32();
   if (stated != crc32c(0, in.first(kSegmentChecksumAt))) return SegmentHeaderState::kDamaged;
   return header.version == kRecordingVersion ? SegmentHeaderState::kGood : SegmentHeaderState::kOtherVersion;
 }
 
 bool decode(std::span<const std::uint8_t, kRecordHeaderBytes> in, std::uint32_t run_checksum,
             RecordHeader& header) {
-  LittleEndianReader from(in);
+  LittleFieldReader from(in);
   const std::uint32_t stated = from.u32();
   header.payload_crc = from.u32();
   header.sequence = from.u64();

@@ -12,10 +12,8 @@
 // block of an earlier recording, never passes for one of this run.
 
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <string>
 
@@ -120,73 +118,5 @@ SegmentHeaderState decode(std::span<const std::uint8_t, kSegmentHeaderBytes> in,
 /// False if this is not a valid record header of the run.
 bool decode(std::span<const std::uint8_t, kRecordHeaderBytes> in, std::uint32_t run_checksum,
             RecordHeader& header);
-
-/// Writes numbers in sequence to memory that must be large enough.
-class LittleEndianWriter {
- public:
-  explicit LittleEndianWriter(std::uint8_t* out) : begin_(out), at_(out) {}
-  void u8(std::uint8_t value) { *at_++ = value; }
-  void u16(std::uint16_t value) { put(value); }
-  void u32(std::uint32_t value) { put(value); }
-  void u64(std::uint64_t value) { put(value); }
-  void i32(std::int32_t value) { put(static_cast<std::uint32_t>(value)); }
-  void i64(std::int64_t value) { put(static_cast<std::uint64_t>(value)); }
-  void f64(double value) { put(std::bit_cast<std::uint64_t>(value)); }
-  void bytes(std::span<const std::uint8_t> values) {
-    if (!values.empty()) std::memcpy(at_, values.data(), values.size());
-    at_ += values.size();
-  }
-  void zeros(std::size_t count) {
-    std::memset(at_, 0, count);
-    at_ += count;
-  }
-  [[nodiscard]] std::size_t written() const { return static_cast<std::size_t>(at_ - begin_); }
-
- private:
-  template <typename Word>
-  void put(Word value) {
-    for (std::size_t i = 0; i < sizeof(Word); ++i) *at_++ = static_cast<std::uint8_t>(value >> (8U * i));
-  }
-  std::uint8_t* begin_;
-  std::uint8_t* at_;
-};
-
-/// Reads them back. Beyond the end all values are zero and good() is false.
-class LittleEndianReader {
- public:
-  explicit LittleEndianReader(std::span<const std::uint8_t> in) : left_(in) {}
-  std::uint8_t u8() { return get<std::uint8_t>(); }
-  std::uint16_t u16() { return get<std::uint16_t>(); }
-  std::uint32_t u32() { return get<std::uint32_t>(); }
-  std::uint64_t u64() { return get<std::uint64_t>(); }
-  std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
-  std::int64_t i64() { return static_cast<std::int64_t>(u64()); }
-  double f64() { return std::bit_cast<double>(u64()); }
-  std::span<const std::uint8_t> bytes(std::size_t count) {
-    if (count > left_.size()) {
-      good_ = false;
-      left_ = {};
-      return {};
-    }
-    const std::span<const std::uint8_t> taken = left_.first(count);
-    left_ = left_.subspan(count);
-    return taken;
-  }
-  [[nodiscard]] bool good() const { return good_; }
-  [[nodiscard]] std::size_t left() const { return left_.size(); }
-
- private:
-  template <typename Word>
-  Word get() {
-    const std::span<const std::uint8_t> in = bytes(sizeof(Word));
-    Word value = 0;
-    for (std::size_t i = 0; i < in.size(); ++i) {
-      value = static_cast<Word>(value | static_cast<Word>(static_cast<Word>(in[i]) << (8U * i)));
-    }
-    return value;
-  }
-  std::span<const std::uint8_t> left_;
-  bool good_ = true;
-};
 
 }  // namespace swiftlet

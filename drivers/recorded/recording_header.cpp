@@ -1,7 +1,7 @@
 #include "drivers/recorded/recording_header.hpp"
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/image/image_decoder.hpp"
-#include "drivers/recorded/recording_format.hpp"
 
 namespace swiftlet {
 namespace {
@@ -13,17 +13,17 @@ constexpr std::size_t kFixedPartBytes = 1024;
 constexpr std::uint32_t kRolls = 2;
 constexpr Duration kMaxReadout = Duration::fromMilliseconds(1000);
 
-void put(LittleEndianWriter& to, const std::string& text) {
+void put(LittleFieldWriter& to, const std::string& text) {
   to.u32(static_cast<std::uint32_t>(text.size()));
-  to.bytes({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  to.copy({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-void put(LittleEndianWriter& to, const SE3& T) {
+void put(LittleFieldWriter& to, const SE3& T) {
   for (int i = 0; i < 4; ++i) to.f64(T.rotation.coeffs()[i]);
   for (int i = 0; i < 3; ++i) to.f64(T.translation[i]);
 }
 
-void put(LittleEndianWriter& to, const DepthImageView& sensor) {
+void put(LittleFieldWriter& to, const DepthImageView& sensor) {
   const PinholeIntrinsics& camera = sensor.camera;
   to.i32(camera.width);
   to.i32(camera.height);
@@ -31,31 +31,31 @@ void put(LittleEndianWriter& to, const DepthImageView& sensor) {
   put(to, sensor.T_body_camera);
 }
 
-void put(LittleEndianWriter& to, const ImuNoise& noise) {
+void put(LittleFieldWriter& to, const ImuNoise& noise) {
   for (const double value : {noise.gyro_density, noise.accel_density, noise.gyro_walk, noise.accel_walk,
                              noise.rate_hz, noise.gravity, noise.gyro_saturation, noise.accel_saturation}) {
     to.f64(value);
   }
 }
 
-bool get(LittleEndianReader& from, std::string& text) {
+bool get(LittleFieldReader& from, std::string& text) {
   const std::span<const std::uint8_t> bytes = from.bytes(from.u32());
   text.assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return from.good();
+  return from.ok();
 }
 
 bool saneSize(int width, int height) {
   return width > 0 && height > 0 && width <= kMaxImageSide && height <= kMaxImageSide;
 }
 
-bool get(LittleEndianReader& from, SE3& T) {
+bool get(LittleFieldReader& from, SE3& T) {
   // Not through SE3's constructor, which would normalize and so change bits.
   for (int i = 0; i < 4; ++i) T.rotation.coeffs()[i] = from.f64();
   for (int i = 0; i < 3; ++i) T.translation[i] = from.f64();
   return T.rotation.coeffs().allFinite() && T.translation.allFinite();
 }
 
-bool get(LittleEndianReader& from, DepthImageView& sensor) {
+bool get(LittleFieldReader& from, DepthImageView& sensor) {
   PinholeIntrinsics& camera = sensor.camera;
   camera.width = from.i32();
   camera.height = from.i32();
@@ -66,21 +66,21 @@ bool get(LittleEndianReader& from, DepthImageView& sensor) {
   camera.cx = intrinsics[2];
   camera.cy = intrinsics[3];
   const bool placed = get(from, sensor.T_body_camera);
-  return from.good() && saneSize(camera.width, camera.height) && intrinsics.allFinite() && camera.fx > 0 &&
+  return from.ok() && saneSize(camera.width, camera.height) && intrinsics.allFinite() && camera.fx > 0 &&
          camera.fy > 0 && placed;
 }
 
-bool get(LittleEndianReader& from, ImuNoise& noise) {
+bool get(LittleFieldReader& from, ImuNoise& noise) {
   for (double* value : {&noise.gyro_density, &noise.accel_density, &noise.gyro_walk, &noise.accel_walk,
                         &noise.rate_hz, &noise.gravity, &noise.gyro_saturation, &noise.accel_saturation}) {
     *value = from.f64();
   }
-  return from.good();
+  return from.ok();
 }
 
 }  // namespace
 
-void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam) {
+void encodeCamera(LittleFieldWriter& to, const CameraModel& camera, const SE3& T_body_cam) {
   to.u32(camera.kind() == CameraKind::kPinholeRadtan ? 0U : 1U);
   to.i32(camera.width());
   to.i32(camera.height());
@@ -89,7 +89,7 @@ void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& 
   put(to, T_body_cam);
 }
 
-bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam) {
+bool decodeCamera(LittleFieldReader& from, CameraModel& camera, SE3& T_body_cam) {
   const std::uint32_t kind = from.u32();
   const std::int32_t width = from.i32();
   const std::int32_t height = from.i32();
@@ -98,7 +98,7 @@ bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam
   for (int i = 0; i < 4; ++i) intrinsics[i] = from.f64();
   for (int i = 0; i < 4; ++i) distortion[i] = from.f64();
   const bool placed = get(from, T_body_cam);
-  const bool sane = from.good() && kind <= 1 && saneSize(width, height) && intrinsics.allFinite() &&
+  const bool sane = from.ok() && kind <= 1 && saneSize(width, height) && intrinsics.allFinite() &&
                     intrinsics[0] > 0 && intrinsics[1] > 0 && distortion.allFinite() && placed;
   if (!sane) return false;
   camera = CameraModel(kind == 0 ? CameraKind::kPinholeRadtan : CameraKind::kEquidistant, width, height,
@@ -109,7 +109,7 @@ bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam
 std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   std::vector<std::uint8_t> payload(kFixedPartBytes + header.calibration_form.size() +
                                     header.settings.size() + header.program_version.size());
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u32(static_cast<std::uint32_t>(header.order) | (header.rig.rolls() ? kRolls : 0));
   to.u32(static_cast<std::uint32_t>(header.rig.camera_count));
   for (std::size_t i = 0; i < header.rig.camera_count; ++i) {
@@ -123,12 +123,12 @@ std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header) {
   put(to, header.program_version);
   // Written only if present: other recordings stay readable by programs that do not know this field.
   if (header.depth_sensor) put(to, *header.depth_sensor);
-  payload.resize(to.written());
+  payload.resize(to.written().size());
   return payload;
 }
 
 const char* decodeRecordingHeader(std::span<const std::uint8_t> payload, RecordingHeader& header) {
-  LittleEndianReader from(payload);
+  LittleFieldReader from(payload);
   const std::uint32_t order = from.u32();
   if ((order & ~kRolls) > 1) return "order";
   header.order = static_cast<RecordOrder>(order & ~kRolls);

@@ -8,14 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "drivers/device/byte_fields.hpp"
 #include "estimator/camera/rig.hpp"
 #include "estimator/imu/imu_noise.hpp"
 #include "estimator/messages/depth_image.hpp"
 
 namespace swiftlet {
-
-class LittleEndianReader;
-class LittleEndianWriter;
 
 enum class RecordOrder : std::uint8_t {
   /// Several threads fed the estimator: a reader merges the streams by arrival (at equal times IMU, camera 0,
@@ -39,9 +37,9 @@ struct RecordingHeader {
 
 /// A camera and its extrinsics, in kCameraBytes.
 inline constexpr std::size_t kCameraBytes = 3 * 4 + 8 * 8 + 7 * 8;
-void encodeCamera(LittleEndianWriter& to, const CameraModel& camera, const SE3& T_body_cam);
+void encodeCamera(LittleFieldWriter& to, const CameraModel& camera, const SE3& T_body_cam);
 /// False if the data are not a valid camera.
-bool decodeCamera(LittleEndianReader& from, CameraModel& camera, SE3& T_body_cam);
+bool decodeCamera(LittleFieldReader& from, CameraModel& camera, SE3& T_body_cam);
 
 /// The payload of the first record.
 std::vector<std::uint8_t> encodeRecordingHeader(const RecordingHeader& header);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 
@@ -44,16 +45,16 @@ class Indexer {
   bool takeRecord(RecordingWindow& window, std::uint64_t& offset);
   void take(const RecordHeader& header, RecordingWindow& window, std::uint64_t offset);
   void takeRun(const RecordHeader& header, RecordingWindow& window, std::uint64_t offset);
-  void takeImu(LittleEndianReader& from);
-  void takeImage(const RecordHeader& header, LittleEndianReader& from, const RecordingFile& file,
+  void takeImu(LittleFieldReader& from);
+  void takeImage(const RecordHeader& header, LittleFieldReader& from, const RecordingFile& file,
                  std::uint64_t offset);
-  void takeTrackStep(LittleEndianReader& from);
-  void takeSmoothStep(LittleEndianReader& from);
-  void takeMeshStep(LittleEndianReader& from);
-  void takeLoopStep(LittleEndianReader& from);
-  void takeMapStep(const RecordHeader& header, LittleEndianReader& from, const RecordingFile& file,
+  void takeTrackStep(LittleFieldReader& from);
+  void takeSmoothStep(LittleFieldReader& from);
+  void takeMeshStep(LittleFieldReader& from);
+  void takeLoopStep(LittleFieldReader& from);
+  void takeMapStep(const RecordHeader& header, LittleFieldReader& from, const RecordingFile& file,
                    std::uint64_t offset);
-  void takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset);
+  void takeLoss(LittleFieldReader& from, const RecordingFile& file, std::uint64_t offset);
   void cutAt(std::uint64_t offset, const char* reason);
   [[nodiscard]] std::uint64_t soundRecords(RecordingWindow& window, std::size_t segment,
                                            std::uint64_t offset) const;
@@ -232,7 +233,7 @@ void Indexer::take(const RecordHeader& header, RecordingWindow& window, std::uin
   std::array<std::uint8_t, kLargestSmallPayload> payload{};
   const std::span<const std::uint8_t> bytes = window.exactly(offset + kRecordHeaderBytes, length);
   std::copy(bytes.begin(), bytes.end(), payload.begin());
-  LittleEndianReader from(payload);
+  LittleFieldReader from(payload);
   std::uint64_t& number = last_number_[static_cast<std::size_t>(kind)];
   if (number == std::numeric_limits<std::uint64_t>::max()) {
     refuse(file, offset, "more records lost than can be counted", kReplayBefore);
@@ -283,7 +284,7 @@ void Indexer::takeRun(const RecordHeader& header, RecordingWindow& window, std::
   }
 }
 
-void Indexer::takeImu(LittleEndianReader& from) {
+void Indexer::takeImu(LittleFieldReader& from) {
   RecordedImu& entry = index_.imu.emplace_back();
   entry.sample.stamp.ns = from.i64();
   entry.arrival.ns = from.i64();
@@ -292,7 +293,7 @@ void Indexer::takeImu(LittleEndianReader& from) {
   index_.turns.push_back(static_cast<std::uint8_t>(RecordKind::kImu));
 }
 
-void Indexer::takeImage(const RecordHeader& header, LittleEndianReader& from, const RecordingFile& file,
+void Indexer::takeImage(const RecordHeader& header, LittleFieldReader& from, const RecordingFile& file,
                         std::uint64_t offset) {
   const std::size_t camera = header.kind == RecordKind::kImage0 ? 0 : 1;
   RecordedImage& entry = index_.images[camera].emplace_back();
@@ -316,7 +317,7 @@ void Indexer::takeImage(const RecordHeader& header, LittleEndianReader& from, co
   index_.turns.push_back(static_cast<std::uint8_t>(header.kind));
 }
 
-void Indexer::takeTrackStep(LittleEndianReader& from) {
+void Indexer::takeTrackStep(LittleFieldReader& from) {
   TrackStep& step = index_.steps.track.emplace_back();
   step.frame = from.u64();
   step.stamp.ns = from.i64();
@@ -328,7 +329,7 @@ void Indexer::takeTrackStep(LittleEndianReader& from) {
   step.effort.keyframes = from.i32();
 }
 
-void Indexer::takeSmoothStep(LittleEndianReader& from) {
+void Indexer::takeSmoothStep(LittleFieldReader& from) {
   SmoothStep& step = index_.steps.smooth.emplace_back();
   step.frame = from.u64();
   step.samples = from.u64();
@@ -339,21 +340,21 @@ void Indexer::takeSmoothStep(LittleEndianReader& from) {
   step.planes = from.u64();  // zero in an older, shorter record
 }
 
-void Indexer::takeMeshStep(LittleEndianReader& from) {
+void Indexer::takeMeshStep(LittleFieldReader& from) {
   MeshStep& step = index_.steps.mesh.emplace_back();
   step.frame = from.u64();
   step.window = from.u64();
   step.image = from.u64();
 }
 
-void Indexer::takeLoopStep(LittleEndianReader& from) {
+void Indexer::takeLoopStep(LittleFieldReader& from) {
   LoopStep& step = index_.steps.loop.emplace_back();
   step.frame = from.u64();
   step.window = from.u64();
   for (std::uint64_t& image : step.image) image = from.u64();
 }
 
-void Indexer::takeMapStep(const RecordHeader& header, LittleEndianReader& from, const RecordingFile& file,
+void Indexer::takeMapStep(const RecordHeader& header, LittleFieldReader& from, const RecordingFile& file,
                           std::uint64_t offset) {
   MapStep& step = index_.steps.map.emplace_back();
   step.frame = from.u64();
@@ -389,7 +390,7 @@ void Indexer::takeMapStep(const RecordHeader& header, LittleEndianReader& from, 
   index_.scenes.push_back({offset, segment_, header.length});
 }
 
-void Indexer::takeLoss(LittleEndianReader& from, const RecordingFile& file, std::uint64_t offset) {
+void Indexer::takeLoss(LittleFieldReader& from, const RecordingFile& file, std::uint64_t offset) {
   const std::uint32_t kind = from.u32();
   (void)from.u32();
   const std::uint64_t count = from.u64();

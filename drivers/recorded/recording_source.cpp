@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 
 namespace swiftlet {
@@ -200,7 +201,7 @@ void RecordingSource::read(std::size_t camera, const RecordedImage& entry, Camer
   std::array<std::uint8_t, kRecordHeaderBytes + kImageHeadBytes> head{};
   const std::span<std::uint8_t> body(pool.memory.data() + pool.slot * pool.slot_bytes, bodyBytes(entry));
   readSound(entry, head, body);
-  LittleEndianReader from{std::span(head).subspan<kRecordHeaderBytes>()};
+  LittleFieldReader from{std::span(head).subspan<kRecordHeaderBytes>()};
   frame.stamp.ns = from.i64();
   frame.arrival.ns = from.i64();
   if (frame.stamp != entry.stamp || frame.arrival != entry.arrival) refuseChanged(entry);
@@ -224,7 +225,7 @@ bool RecordingSource::mapScene(std::size_t i, SceneImages& scene) {
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): bytes of the floats that they are
   const std::span<std::uint8_t> body(reinterpret_cast<std::uint8_t*>(scene_.data()), bodyBytes(entry));
   readSound(entry, head, body);
-  LittleEndianReader from{std::span(head).subspan<kRecordHeaderBytes + kMapStepSceneAt>()};
+  LittleFieldReader from{std::span(head).subspan<kRecordHeaderBytes + kMapStepSceneAt>()};
   scene.stamp.ns = from.i64();
   const Stamp depth_stamp{from.i64()};
   PinholeIntrinsics depth;

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 
@@ -48,7 +49,7 @@ iovec readOnly(std::span<const std::uint8_t> piece) {
   return {const_cast<std::uint8_t*>(piece.data()), piece.size()};
 }
 
-void appendEffort(LittleEndianWriter& to, const Effort& effort) {
+void appendEffort(LittleFieldWriter& to, const Effort& effort) {
   to.i32(effort.iterations);
   to.i32(effort.features);
   to.i32(effort.keyframes);
@@ -177,7 +178,7 @@ void RecordingWriter::closeFiles() {
 
 Status RecordingWriter::imu(const ImuSample& sample, Stamp arrival) {
   std::array<std::uint8_t, kImuPayloadBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.i64(sample.stamp.ns);
   to.i64(arrival.ns);
   for (int i = 0; i < 3; ++i) to.f64(sample.gyro[i]);
@@ -202,7 +203,7 @@ Status RecordingWriter::image(const CameraFrame& frame) {
     return {StatusCode::kInvalidInput, "an image of a camera that is not in the rig, or too large to record"};
   }
   std::array<std::uint8_t, kImageHeadBytes> head{};
-  LittleEndianWriter to(head.data());
+  LittleFieldWriter to(head);
   to.i64(frame.stamp.ns);
   to.i64(frame.arrival.ns);
   to.u64(frame.sequence);
@@ -233,7 +234,7 @@ Status RecordingWriter::mapStep(const MapStep& step, const SceneImages& scene) {
   }
   const bool labels = !scene.labels.empty();
   std::array<std::uint8_t, kMapStepHeadBytes> head{};
-  LittleEndianWriter to(head.data());
+  LittleFieldWriter to(head);
   to.u64(step.frame);
   to.u64(step.correction);
   to.u64(step.spare_turns);
@@ -271,13 +272,13 @@ Status RecordingWriter::putPixels(RecordKind kind, std::span<const std::uint8_t>
   if (direct) return putDirect(header, head, planes);
 
   appendHeader(header);
-  LittleEndianWriter body(buffer_.data() + filled_);
-  body.bytes(head);
+  LittleFieldWriter body{std::span(buffer_).subspan(filled_)};
+  body.copy(head);
   for (const Pixels& plane : planes) {
-    for (std::size_t y = 0; y < plane.rows; ++y) body.bytes(plane.row(y));
+    for (std::size_t y = 0; y < plane.rows; ++y) body.copy(plane.row(y));
   }
   body.zeros(padding);
-  filled_ += body.written();
+  filled_ += body.written().size();
   return okStatus();
 }
 
@@ -317,7 +318,7 @@ Status RecordingWriter::putDirect(const RecordHeader& header, std::span<const st
 
 Status RecordingWriter::propagateStep(const PropagateStep& step) {
   std::array<std::uint8_t, kPropagateStepBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u64(step.samples);
   to.u64(step.fix);
   return put(RecordKind::kPropagateStep, payload.data(), payload.size());
@@ -325,7 +326,7 @@ Status RecordingWriter::propagateStep(const PropagateStep& step) {
 
 Status RecordingWriter::trackStep(const TrackStep& step) {
   std::array<std::uint8_t, kTrackStepBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u64(step.frame);
   to.i64(step.stamp.ns);
   for (const std::uint64_t image : step.image) to.u64(image);
@@ -337,7 +338,7 @@ Status RecordingWriter::trackStep(const TrackStep& step) {
 
 Status RecordingWriter::smoothStep(const SmoothStep& step) {
   std::array<std::uint8_t, kSmoothStepBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u64(step.frame);
   to.u64(step.samples);
   appendEffort(to, step.effort);
@@ -347,7 +348,7 @@ Status RecordingWriter::smoothStep(const SmoothStep& step) {
 
 Status RecordingWriter::meshStep(const MeshStep& step) {
   std::array<std::uint8_t, kMeshStepBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u64(step.frame);
   to.u64(step.window);
   to.u64(step.image);
@@ -356,7 +357,7 @@ Status RecordingWriter::meshStep(const MeshStep& step) {
 
 Status RecordingWriter::loopStep(const LoopStep& step) {
   std::array<std::uint8_t, kLoopStepBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u64(step.frame);
   to.u64(step.window);
   for (const std::uint64_t image : step.image) to.u64(image);
@@ -369,7 +370,7 @@ Status RecordingWriter::loss(RecordKind kind, std::uint64_t count) {
     return {StatusCode::kInvalidInput, "only messages and steps can be lost"};
   }
   std::array<std::uint8_t, kLossBytes> payload{};
-  LittleEndianWriter to(payload.data());
+  LittleFieldWriter to(payload);
   to.u32(static_cast<std::uint32_t>(kind));
   to.u32(0);
   to.u64(count);
@@ -394,7 +395,7 @@ Status RecordingWriter::sync() {
 Status RecordingWriter::end() {
   if (ended_) return status_;
   std::array<std::uint8_t, kEndBytes> payload{};
-  LittleEndianWriter(payload.data()).u64(sequence_);
+  LittleFieldWriter(payload).u64(sequence_);
   put(RecordKind::kEnd, payload.data(), payload.size());
   sync();
   ended_ = true;
@@ -410,8 +411,8 @@ Status RecordingWriter::put(RecordKind kind, const std::uint8_t* payload, std::s
   std::uint32_t crc = crc32c(run_checksum_, {payload, size});
   crc = crc32c(crc, {kPadding.data(), padded - size});
   appendHeader({kind, sequence_, static_cast<std::uint32_t>(size), crc});
-  LittleEndianWriter to(buffer_.data() + filled_);
-  to.bytes({payload, size});
+  LittleFieldWriter to{std::span(buffer_).subspan(filled_)};
+  to.copy({payload, size});
   to.zeros(padded - size);
   filled_ += padded;
   return okStatus();
@@ -488,7 +489,7 @@ void RecordingWriter::loseBuffer(std::size_t written) {
   std::size_t kept = 0;
   std::size_t at = 0;
   while (at < filled_) {
-    LittleEndianReader from(std::span<const std::uint8_t>(buffer_).subspan(at + 16, 6));
+    LittleFieldReader from(std::span<const std::uint8_t>(buffer_).subspan(at + 16, 6));
     const std::size_t size = kRecordHeaderBytes + paddedSize(from.u32());
     const std::uint16_t kind = from.u16();
     at += size;

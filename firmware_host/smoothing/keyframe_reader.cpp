@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/input/stamp_range.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
-#include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/recording_header.hpp"
 
 namespace swiftlet {
@@ -28,13 +27,13 @@ bool sane(Duration shift) { return shift <= kMostShift && shift >= -kMostShift; 
 
 bool sane(Stamp stamp) { return isStampInRange(stamp.ns); }
 
-Eigen::Vector3d getVector(LittleEndianReader& from) {
+Eigen::Vector3d getVector(LittleFieldReader& from) {
   Eigen::Vector3d vector;
   for (int i = 0; i < 3; ++i) vector[i] = from.f64();
   return vector;
 }
 
-bool getPose(LittleEndianReader& from, SE3& pose) {
+bool getPose(LittleFieldReader& from, SE3& pose) {
   // Bypasses SE3's constructor, which would normalize and change bits.
   for (int i = 0; i < 4; ++i) pose.rotation.coeffs()[i] = from.f64();
   pose.translation = getVector(from);
@@ -42,7 +41,7 @@ bool getPose(LittleEndianReader& from, SE3& pose) {
   return pose.translation.allFinite() && std::abs(pose.rotation.norm() - 1) < kUnit;
 }
 
-bool getFeature(LittleEndianReader& from, TrackId& id, std::array<bool, kMaxCameras>& seen,
+bool getFeature(LittleFieldReader& from, TrackId& id, std::array<bool, kMaxCameras>& seen,
                 std::array<Eigen::Vector2f, kMaxCameras>& pixel) {
   id = from.u64();
   bool sane = true;
@@ -53,7 +52,7 @@ bool getFeature(LittleEndianReader& from, TrackId& id, std::array<bool, kMaxCame
   }
   (void)from.u16();
   for (Eigen::Vector2f& at : pixel) {
-    for (int i = 0; i < 2; ++i) at[i] = std::bit_cast<float>(from.u32());
+    for (int i = 0; i < 2; ++i) at[i] = from.f32();
     sane = sane && at.allFinite();
   }
   return sane;
@@ -70,7 +69,7 @@ KeyframeReader::KeyframeReader(std::string name, std::istream& in)
       !std::equal(kMagic.begin(), kMagic.end(), bytes_.begin())) {
     refuse("is not a file of keyframes: it does not start with their magic bytes", kRemedy);
   }
-  LittleEndianReader prefix({bytes_.data() + kMagic.size(), kPrefixBytes - kMagic.size()});
+  LittleFieldReader prefix({bytes_.data() + kMagic.size(), kPrefixBytes - kMagic.size()});
   const std::uint32_t version = prefix.u32();
   if (version != kVersion) {
     throw InputError(name_, 0, "version", fmt::format("is {}, this program reads {}", version, kVersion),
@@ -85,7 +84,7 @@ KeyframeReader::KeyframeReader(std::string name, std::istream& in)
   }
   const std::size_t covered = kPrefixBytes + length - kCrcBytes;
   head_crc_ = crc32c(0, {bytes_.data(), covered});
-  if (LittleEndianReader({bytes_.data() + covered, kCrcBytes}).u32() != head_crc_) refuse(kDamaged, kLost);
+  if (LittleFieldReader({bytes_.data() + covered, kCrcBytes}).u32() != head_crc_) refuse(kDamaged, kLost);
   RecordingHeader calibration;
   const char* wrong =
       decodeRecordingHeader({bytes_.data() + kPrefixBytes, covered - kPrefixBytes}, calibration);
@@ -117,7 +116,7 @@ KeyframeReader::Next KeyframeReader::next() {
   if (ended_) return Next::kEnd;
   const std::size_t got = read(bytes_.data(), kRecordBytes);
   if (got < kRecordBytes) return endAt(got == 0 ? "not closed properly, truncated" : "truncated");
-  LittleEndianReader from({bytes_.data(), kRecordBytes});
+  LittleFieldReader from({bytes_.data(), kRecordBytes});
   const std::uint32_t stated = from.u32();
   const std::uint16_t kind = from.u16();
   const std::uint16_t zero = from.u16();
@@ -157,7 +156,7 @@ KeyframeReader::Next KeyframeReader::next() {
 
 bool KeyframeReader::decodeSample() {
   if (payload_ != kImuBytes) return false;
-  LittleEndianReader from({bytes_.data() + kRecordBytes, payload_});
+  LittleFieldReader from({bytes_.data() + kRecordBytes, payload_});
   const Stamp before = sample_.stamp;
   sample_.stamp.ns = from.i64();
   sample_.gyro = getVector(from);
@@ -168,7 +167,7 @@ bool KeyframeReader::decodeSample() {
 }
 
 bool KeyframeReader::decodeKeyframe() {
-  LittleEndianReader from({bytes_.data() + kRecordBytes, payload_});
+  LittleFieldReader from({bytes_.data() + kRecordBytes, payload_});
   const Stamp before = frame_.stamp;
   frame_.stamp.ns = from.i64();
   state_.stamp = frame_.stamp;
@@ -198,7 +197,7 @@ bool KeyframeReader::decodeKeyframe() {
 }
 
 bool KeyframeReader::decodeRevisit() {
-  LittleEndianReader from({bytes_.data() + kRecordBytes, payload_});
+  LittleFieldReader from({bytes_.data() + kRecordBytes, payload_});
   revisit_.old_stamp.ns = from.i64();
   revisit_.new_stamp.ns = from.i64();
   bool good = sane(revisit_.old_stamp) && sane(revisit_.new_stamp);
@@ -214,13 +213,13 @@ bool KeyframeReader::decodeRevisit() {
       good = has_track <= 1 && getFeature(from, feature->track, feature->seen, feature->pixel) && good;
     }
   }
-  return good && from.good() && revisit_.information.allFinite();
+  return good && from.ok() && revisit_.information.allFinite();
 }
 
 bool KeyframeReader::decodeCalibration() {
   const bool with_readout = rig_.rolls();
   if (payload_ != kCalibrationBytes + (with_readout ? kReadoutBytes : 0)) return false;
-  LittleEndianReader from({bytes_.data() + kRecordBytes, payload_});
+  LittleFieldReader from({bytes_.data() + kRecordBytes, payload_});
   calibration_.camera_to_imu_shift.ns = from.i64();
   bool good = sane(calibration_.camera_to_imu_shift);
   for (SE3& T : calibration_.T_body_cam) good = getPose(from, T) && good;

@@ -2,13 +2,13 @@
 
 #include <unistd.h>
 
-#include <bit>
 #include <cerrno>
 #include <cstring>
+#include <span>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
-#include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/recording_header.hpp"
 #include "estimator/odometry/odometry_inputs.hpp"
 
@@ -17,23 +17,23 @@ namespace {
 
 using namespace keyframe_file;  // NOLINT(google-build-using-namespace)
 
-void put(LittleEndianWriter& to, const Eigen::Vector3d& vector) {
+void put(LittleFieldWriter& to, const Eigen::Vector3d& vector) {
   for (int i = 0; i < 3; ++i) to.f64(vector[i]);
 }
 
-void put(LittleEndianWriter& to, const SE3& pose) {
+void put(LittleFieldWriter& to, const SE3& pose) {
   for (int i = 0; i < 4; ++i) to.f64(pose.rotation.coeffs()[i]);
   put(to, pose.translation);
 }
 
-void put(LittleEndianWriter& to, TrackId id, const std::array<bool, kMaxCameras>& seen,
+void put(LittleFieldWriter& to, TrackId id, const std::array<bool, kMaxCameras>& seen,
          const std::array<Eigen::Vector2f, kMaxCameras>& pixel) {
   to.u64(id);
   for (const bool by : seen) to.u8(by ? 1 : 0);
   to.u16(0);
   for (std::size_t c = 0; c < kMaxCameras; ++c) {
     // Pixels of unseen features are written as 0, so that equal runs give equal bytes.
-    for (int i = 0; i < 2; ++i) to.u32(seen[c] ? std::bit_cast<std::uint32_t>(pixel[c][i]) : 0U);
+    for (int i = 0; i < 2; ++i) to.f32(seen[c] ? pixel[c][i] : 0.0F);
   }
 }
 
@@ -64,15 +64,15 @@ void MapKeeper::writeHead(const Rig& rig, const ImuNoise& noise) {
   calibration.noise = noise;
   const std::vector<std::uint8_t> encoded = encodeRecordingHeader(calibration);
   const std::size_t length = encoded.size() + kCrcBytes;
-  LittleEndianWriter to(record_.data());
-  to.bytes(kMagic);
+  LittleFieldWriter to(record_);
+  to.copy(kMagic);
   to.u32(kVersion);
   to.u32(static_cast<std::uint32_t>(length));
-  to.bytes(encoded);
-  head_crc_ = crc32c(0, {record_.data(), to.written()});
+  to.copy(encoded);
+  head_crc_ = crc32c(0, to.written());
   to.u32(head_crc_);
-  head_bytes_ = static_cast<long>(to.written());
-  check(std::fwrite(record_.data(), 1, to.written(), file_.get()) == to.written() &&
+  head_bytes_ = static_cast<long>(to.written().size());
+  check(std::fwrite(record_.data(), 1, to.written().size(), file_.get()) == to.written().size() &&
         std::fflush(file_.get()) == 0);
 }
 
@@ -83,14 +83,14 @@ void MapKeeper::check(bool written) {
 }
 
 void MapKeeper::writeRecord(Kind kind, std::size_t payload) {
-  LittleEndianWriter to(record_.data());
+  LittleFieldWriter to(record_);
   to.u32(0);
   to.u16(static_cast<std::uint16_t>(kind));
   to.u16(0);
   to.u32(static_cast<std::uint32_t>(payload));
   const std::size_t size = kRecordBytes + payload;
   const std::uint32_t crc = crc32c(head_crc_, {record_.data() + kCrcBytes, size - kCrcBytes});
-  LittleEndianWriter(record_.data()).u32(crc);
+  LittleFieldWriter(record_).u32(crc);
   const bool flush = kind != Kind::kImu && kind != Kind::kCalibration;
   check(std::fwrite(record_.data(), 1, size, file_.get()) == size &&
         (!flush || std::fflush(file_.get()) == 0));
@@ -106,16 +106,16 @@ void MapKeeper::restart() {
 
 void MapKeeper::addImu(const ImuSample& sample) {
   if (!monitor_.check(sample).status.ok() || !file_) return;
-  LittleEndianWriter to(record_.data() + kRecordBytes);
+  LittleFieldWriter to{std::span(record_).subspan(kRecordBytes)};
   to.i64(sample.stamp.ns);
   put(to, sample.gyro);
   put(to, sample.accel);
-  writeRecord(Kind::kImu, to.written());
+  writeRecord(Kind::kImu, to.written().size());
 }
 
 void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state, const NoiseInUse& noise) {
   if (!file_) return;
-  LittleEndianWriter to(record_.data() + kRecordBytes);
+  LittleFieldWriter to{std::span(record_).subspan(kRecordBytes)};
   to.i64(frame.stamp.ns);
   to.u32(state.epoch);
   to.u32(static_cast<std::uint32_t>(frame.features.size()));
@@ -125,23 +125,23 @@ void MapKeeper::addKeyframe(const TrackedFrame& frame, const NavState& state, co
   put(to, state.bias_accel);
   for (const double figure : {noise.pixel_sigma, noise.imu.gyro, noise.imu.accel}) to.f64(figure);
   for (const TrackedFeature& feature : frame.features) put(to, feature.id, feature.seen, feature.pixel);
-  writeRecord(Kind::kKeyframe, to.written());
+  writeRecord(Kind::kKeyframe, to.written().size());
 }
 
 void MapKeeper::addCalibration(const CalibrationEstimate& calibration) {
   if (!file_ || !calibration_estimated_) return;
-  LittleEndianWriter to(record_.data() + kRecordBytes);
+  LittleFieldWriter to{std::span(record_).subspan(kRecordBytes)};
   to.i64(calibration.camera_to_imu_shift.ns);
   for (const SE3& T : calibration.T_body_cam) put(to, T);
   for (const double entry : calibration.gyro.matrix.reshaped<Eigen::RowMajor>()) to.f64(entry);
   if (rolls_) to.i64(calibration.readout.ns);
-  writeRecord(Kind::kCalibration, to.written());
+  writeRecord(Kind::kCalibration, to.written().size());
 }
 
 void MapKeeper::addRevisit(const LoopRevisit& revisit) {
   if (!file_) return;
   const std::size_t matches = std::min(revisit.matches.size(), kMostMatches);
-  LittleEndianWriter to(record_.data() + kRecordBytes);
+  LittleFieldWriter to{std::span(record_).subspan(kRecordBytes)};
   to.i64(revisit.old_stamp.ns);
   to.i64(revisit.new_stamp.ns);
   put(to, revisit.T_old_new);
@@ -153,7 +153,7 @@ void MapKeeper::addRevisit(const LoopRevisit& revisit) {
       put(to, feature->track, feature->seen, feature->pixel);
     }
   }
-  writeRecord(Kind::kRevisit, to.written());
+  writeRecord(Kind::kRevisit, to.written().size());
 }
 
 void MapKeeper::finish() {

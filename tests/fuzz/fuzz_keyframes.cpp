@@ -4,9 +4,9 @@
 #include <sstream>
 #include <string>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
-#include "drivers/recorded/recording_format.hpp"
 #include "estimator/smoother/full_smoother.hpp"
 #include "firmware_host/smoothing/keyframe_reader.hpp"
 #include "tests/fuzz/demand.hpp"
@@ -21,16 +21,16 @@ std::string withChecksums(std::string_view text) {
   std::string bytes(text);
   auto* const data = reinterpret_cast<std::uint8_t*>(bytes.data());
   if (bytes.size() < kPrefixBytes) return bytes;
-  const std::size_t head = LittleEndianReader({data + kPrefixBytes - 4, 4}).u32();
+  const std::size_t head = LittleFieldReader({data + kPrefixBytes - 4, 4}).u32();
   if (head < kCrcBytes || head > bytes.size() - kPrefixBytes) return bytes;
   const std::size_t covered = kPrefixBytes + head - kCrcBytes;
   const std::uint32_t of_head = crc32c(0, {data, covered});
-  LittleEndianWriter(data + covered).u32(of_head);
+  LittleFieldWriter({data + covered, kCrcBytes}).u32(of_head);
   for (std::size_t at = kPrefixBytes + head; bytes.size() - at >= kRecordBytes;) {
-    const std::size_t length = LittleEndianReader({data + at + 8, 4}).u32();
+    const std::size_t length = LittleFieldReader({data + at + 8, 4}).u32();
     if (length > bytes.size() - at - kRecordBytes) break;
     const std::uint32_t crc = crc32c(of_head, {data + at + kCrcBytes, kRecordBytes - kCrcBytes + length});
-    LittleEndianWriter(data + at).u32(crc);
+    LittleFieldWriter({data + at, kCrcBytes}).u32(crc);
     at += kRecordBytes + length;
   }
   return bytes;

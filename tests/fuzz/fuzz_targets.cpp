@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "drivers/calibration/calibration.hpp"
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/recorded/image_list.hpp"
 #include "drivers/recorded/imu_file.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
-#include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/track_file.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
@@ -249,7 +249,7 @@ void keptGraph(std::string_view text) {
   for (const bool mended : {false, true}) {
     if (mended && bytes.size() >= kCrc) {
       const std::size_t covered = bytes.size() - kCrc;
-      LittleEndianWriter(bytes.data() + covered).u32(crc32c(0, {bytes.data(), covered}));
+      LittleFieldWriter({bytes.data() + covered, kCrc}).u32(crc32c(0, {bytes.data(), covered}));
     }
     try {
       const KeptGraph graph = readKeptGraph("graph.swg", bytes);
@@ -268,11 +268,11 @@ std::string withMapChecksums(std::string_view text) {
   auto* const data = reinterpret_cast<std::uint8_t*>(bytes.data());
   if (bytes.size() < kHead) return bytes;
   const std::uint32_t head = crc32c(0, {data, kHead - kCrc});
-  LittleEndianWriter(data + kHead - kCrc).u32(head);
+  LittleFieldWriter({data + kHead - kCrc, kCrc}).u32(head);
   for (std::size_t at = kHead; bytes.size() - at >= kRecord;) {
-    const std::size_t length = LittleEndianReader({data + at + kLengthAt, sizeof(std::uint32_t)}).u32();
+    const std::size_t length = LittleFieldReader({data + at + kLengthAt, sizeof(std::uint32_t)}).u32();
     if (length > bytes.size() - at - kRecord) break;
-    LittleEndianWriter(data + at).u32(crc32c(head, {data + at + kCrc, kRecord - kCrc + length}));
+    LittleFieldWriter({data + at, kCrc}).u32(crc32c(head, {data + at + kCrc, kRecord - kCrc + length}));
     at += kRecord + length;
   }
   return bytes;

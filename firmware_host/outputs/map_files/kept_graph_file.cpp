@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
-#include "drivers/recorded/recording_format.hpp"
 #include "drivers/recorded/recording_header.hpp"
 
 namespace swiftlet {
@@ -37,10 +36,10 @@ constexpr int kMostOctaves = 16;
 
 class GraphWriter {
  public:
-  explicit GraphWriter(std::size_t bytes) : bytes_(bytes), to_(bytes_.data()) {}
+  explicit GraphWriter(std::size_t bytes) : bytes_(bytes), to_(bytes_) {}
 
   std::vector<std::uint8_t> operator()(const KeptGraph& graph) {
-    to_.bytes(kGraphMagic);
+    to_.copy(kGraphMagic);
     to_.u32(kGraphVersion);
     to_.u32(static_cast<std::uint32_t>(graph.nodes.size()));
     to_.u32(static_cast<std::uint32_t>(graph.loops.size()));
@@ -57,7 +56,6 @@ class GraphWriter {
   }
 
  private:
-  void f32(float value) { to_.u32(std::bit_cast<std::uint32_t>(value)); }
   void pose(const SE3& T) {
     for (int i = 0; i < 3; ++i) to_.f64(T.translation[i]);
     for (int i = 0; i < 4; ++i) to_.f64(T.rotation.coeffs()[i]);
@@ -79,16 +77,16 @@ class GraphWriter {
     to_.u32(static_cast<std::uint32_t>(node.features.size()));
     for (const PlaceFeature& feature : node.features) {
       for (const std::uint64_t word : feature.descriptor.words) to_.u64(word);
-      for (int i = 0; i < 2; ++i) f32(feature.pixel[i]);
-      for (int i = 0; i < 3; ++i) f32(feature.bearing[i]);
-      f32(feature.inverse_depth);
-      f32(feature.inverse_depth_sigma);
+      for (int i = 0; i < 2; ++i) to_.f32(feature.pixel[i]);
+      for (int i = 0; i < 3; ++i) to_.f32(feature.bearing[i]);
+      to_.f32(feature.inverse_depth);
+      to_.f32(feature.inverse_depth_sigma);
       to_.u32(static_cast<std::uint32_t>(feature.octave));
     }
   }
 
   std::vector<std::uint8_t> bytes_;
-  LittleEndianWriter to_;
+  LittleFieldWriter to_;
 };
 
 class GraphReader {
@@ -110,7 +108,7 @@ class GraphReader {
     }
     demand(bytes.size() >= kGraphHeadBytes + kGraphCrcBytes, "head", "is incomplete: the file ends early");
     const std::span<const std::uint8_t> covered = bytes.first(bytes.size() - kGraphCrcBytes);
-    LittleEndianReader crc(bytes.subspan(covered.size()));
+    LittleFieldReader crc(bytes.subspan(covered.size()));
     demand(crc.u32() == crc32c(0, covered), "checksum", "does not match the data: the file is damaged");
     const std::uint32_t nodes = from_.u32();
     const std::uint32_t loops = from_.u32();
@@ -139,7 +137,6 @@ class GraphReader {
     throw InputError(name_, 0, fmt::format("byte {}: {}", size_ - from_.left(), field), message,
                      "Use another copy of the map, or keep a new one. Nothing was loaded");
   }
-  float f32() { return std::bit_cast<float>(from_.u32()); }
   template <int kSize>
   Eigen::Matrix<double, kSize, 1> vector() {
     Eigen::Matrix<double, kSize, 1> out;
@@ -187,10 +184,10 @@ class GraphReader {
   }
   void feature(PlaceFeature& feature) {
     for (std::uint64_t& word : feature.descriptor.words) word = from_.u64();
-    for (float& value : feature.pixel) value = f32();
-    for (float& value : feature.bearing) value = f32();
-    feature.inverse_depth = f32();
-    feature.inverse_depth_sigma = f32();
+    for (float& value : feature.pixel) value = from_.f32();
+    for (float& value : feature.bearing) value = from_.f32();
+    feature.inverse_depth = from_.f32();
+    feature.inverse_depth_sigma = from_.f32();
     const std::uint32_t octave = from_.u32();
     demand(feature.pixel.allFinite(), "pixel of a feature", "is not finite");
     demand(std::abs(feature.bearing.norm() - 1) < static_cast<float>(kUnitTolerance), "bearing of a feature",
@@ -204,7 +201,7 @@ class GraphReader {
 
   const std::string& name_;
   std::size_t size_;
-  LittleEndianReader from_;
+  LittleFieldReader from_;
 };
 
 }  // namespace

@@ -13,7 +13,6 @@
 #include <limits>
 #include <span>
 
-#include "drivers/recorded/recording_format.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "mapping/surface/surface_patch.hpp"
 

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <fstream>
 #include <istream>
@@ -9,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/outputs/map_files/kept_map_format.hpp"
@@ -66,9 +66,9 @@ class MapReader {
   void readFree(MapTaker& taker);
   /// Position in the file of a part of the current payload.
   [[nodiscard]] std::uint64_t at(std::size_t in_payload) const { return record_ + kRecordBytes + in_payload; }
-  BlockIndex readIndex(LittleEndianReader& from, std::size_t in_payload);
-  [[nodiscard]] LittleEndianReader payload() const {
-    return LittleEndianReader({bytes_.data() + kRecordBytes, length_});
+  BlockIndex readIndex(LittleFieldReader& from, std::size_t in_payload);
+  [[nodiscard]] LittleFieldReader payload() const {
+    return LittleFieldReader({bytes_.data() + kRecordBytes, length_});
   }
 
   const std::string& name_;
@@ -100,7 +100,7 @@ void MapReader::fetch(std::size_t at, std::size_t count, const char* field) {
 
 void MapReader::readHead() {
   fetch(0, kHeadBytes, "head");
-  LittleEndianReader from({bytes_.data(), kHeadBytes});
+  LittleFieldReader from({bytes_.data(), kHeadBytes});
   const auto magic = from.bytes(kMagic.size());
   if (!std::equal(magic.begin(), magic.end(), kMagic.begin())) {
     throw InputError(name_, 0, "byte 0: magic", "this is not a map kept by swiftlet",
@@ -110,7 +110,7 @@ void MapReader::readHead() {
   version_ = from.u32();
   const std::uint32_t bytes = from.u32();
   head_crc_ = crc32c(0, {bytes_.data(), kHeadCrcAt});
-  const bool sound = head_crc_ == LittleEndianReader({bytes_.data() + kHeadCrcAt, sizeof(head_crc_)}).u32();
+  const bool sound = head_crc_ == LittleFieldReader({bytes_.data() + kHeadCrcAt, sizeof(head_crc_)}).u32();
   demand(sound, 0, "head's checksum", "does not match the data: the file is damaged");
   if (version_ < kVersionOfWholeBlocks || version_ > kVersion) {
     throw InputError(
@@ -127,7 +127,7 @@ void MapReader::readHead() {
   head_.epoch = from.u32();
   head_.counts.blocks = from.u32();
   head_.counts.free_blocks = from.u32();
-  const auto least_weight = std::bit_cast<float>(from.u32());
+  const float least_weight = from.f32();
   if (version_ > kVersionWithPatches) head_.least_weight = least_weight;
   const std::uint32_t side = from.u32();
   for (int axis = 0; axis < 3; ++axis) head_.p_map_vehicle[axis] = from.f64();
@@ -174,7 +174,7 @@ void MapReader::demandSettings(const VolumeSettings& settings) const {
 Kind MapReader::readRecord() {
   record_ = next_;
   fetch(0, kRecordBytes, "record's head");
-  LittleEndianReader from({bytes_.data(), kRecordBytes});
+  LittleFieldReader from({bytes_.data(), kRecordBytes});
   constexpr std::size_t kCrc = sizeof(std::uint32_t), kLengthAt = 8;
   const std::uint32_t stated = from.u32();
   const std::uint16_t kind = from.u16();
@@ -191,7 +191,7 @@ Kind MapReader::readRecord() {
   return static_cast<Kind>(kind);
 }
 
-BlockIndex MapReader::readIndex(LittleEndianReader& from, std::size_t in_payload) {
+BlockIndex MapReader::readIndex(LittleFieldReader& from, std::size_t in_payload) {
   BlockIndex index;
   index.x = from.i32();
   index.y = from.i32();
@@ -224,7 +224,7 @@ void MapReader::walk(MapTaker& taker) {
 void MapReader::readBlock(MapTaker& taker) {
   demand(length_ == kBlockBytes + (head_.labels ? kLabelBytes : 0), record_, "block's length",
          "does not match a block");
-  LittleEndianReader from = payload();
+  LittleFieldReader from = payload();
   ReadBlock& block = *block_;
   block.index = readIndex(from, 0);
   block.sides = from.u8();
@@ -233,7 +233,7 @@ void MapReader::readBlock(MapTaker& taker) {
   demand(block.sides <= (BlockHeader::kInFront | BlockHeader::kBehind) &&
              std::ranges::all_of(zeros, [](std::uint8_t b) { return b == 0; }),
          at(kIndexBytes), "sides", "are invalid");
-  block.drift = std::bit_cast<float>(from.u32());
+  block.drift = from.f32();
   demand(std::isfinite(block.drift) && block.drift >= 0, at(kIndexBytes + 4), "drift", "is not a length");
   constexpr std::size_t kDistancesAt = kIndexBytes + 8;
   for (std::size_t i = 0; i < kBlockVoxels; ++i) {
@@ -258,7 +258,7 @@ void MapReader::readFree(MapTaker& taker) {
   const bool whole_blocks = version_ == kVersionOfWholeBlocks;
   const std::size_t each = whole_blocks ? kFreeBytesOfWholeBlocks : kFreeBytes;
   demand(length_ > 0 && length_ % each == 0, record_, "free blocks' length", "does not match its content");
-  LittleEndianReader from = payload();
+  LittleFieldReader from = payload();
   ReadBlock& block = *block_;
   block.has_labels = false;
   for (std::size_t i = 0; i < length_; i += each) {

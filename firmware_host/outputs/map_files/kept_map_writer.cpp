@@ -1,10 +1,11 @@
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <ostream>
+#include <span>
 #include <streambuf>
 #include <vector>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/files/whole_file.hpp"
@@ -44,9 +45,9 @@ class MapWriter {
   void writeHead();
   void writeBlock(std::uint32_t slot);
   void writeFree();
-  LittleEndianWriter payload() { return LittleEndianWriter(bytes_.data() + kRecordBytes); }
-  void finish(Kind kind, const LittleEndianWriter& payload);
-  static void index(LittleEndianWriter& to, const BlockIndex& block) {
+  LittleFieldWriter payload() { return LittleFieldWriter(std::span(bytes_).subspan(kRecordBytes)); }
+  void finish(Kind kind, const LittleFieldWriter& payload);
+  static void index(LittleFieldWriter& to, const BlockIndex& block) {
     to.i32(block.x);
     to.i32(block.y);
     to.i32(block.z);
@@ -77,8 +78,8 @@ void MapWriter::place() {
 }
 
 void MapWriter::writeHead() {
-  LittleEndianWriter to(bytes_.data());
-  to.bytes(kMagic);
+  LittleFieldWriter to(bytes_);
+  to.copy(kMagic);
   to.u32(kVersion);
   to.u32(static_cast<std::uint32_t>(kHeadBytes));
   to.f64(head_.voxel_size);
@@ -88,39 +89,39 @@ void MapWriter::writeHead() {
   to.u32(head_.epoch);
   to.u32(head_.counts.blocks);
   to.u32(head_.counts.free_blocks);
-  to.u32(std::bit_cast<std::uint32_t>(static_cast<float>(head_.least_weight)));
+  to.f32(static_cast<float>(head_.least_weight));
   to.u32(kBlockSide);
   for (int axis = 0; axis < 3; ++axis) to.f64(head_.p_map_vehicle[axis]);
-  to.zeros(kHeadCrcAt - to.written());
+  to.zeros(kHeadCrcAt - to.written().size());
   head_crc_ = crc32c(0, {bytes_.data(), kHeadCrcAt});
   to.u32(head_crc_);
   out_.write(reinterpret_cast<const char*>(bytes_.data()), static_cast<std::streamsize>(kHeadBytes));
 }
 
-void MapWriter::finish(Kind kind, const LittleEndianWriter& payload) {
-  const std::size_t size = payload.written();
-  LittleEndianWriter to(bytes_.data());
+void MapWriter::finish(Kind kind, const LittleFieldWriter& payload) {
+  const std::size_t size = payload.written().size();
+  LittleFieldWriter to(bytes_);
   to.u32(0);
   to.u16(static_cast<std::uint16_t>(kind));
   to.u16(0);
   to.u32(static_cast<std::uint32_t>(size));
   constexpr std::size_t kCrc = sizeof(std::uint32_t);
   const std::uint32_t crc = crc32c(head_crc_, {bytes_.data() + kCrc, kRecordBytes - kCrc + size});
-  LittleEndianWriter(bytes_.data()).u32(crc);
+  LittleFieldWriter(bytes_).u32(crc);
   out_.write(reinterpret_cast<const char*>(bytes_.data()), static_cast<std::streamsize>(kRecordBytes + size));
 }
 
 void MapWriter::writeBlock(std::uint32_t slot) {
   const BlockHeader& header = map_.volume.header(slot);
   const VoxelBlock& voxels = *map_.volume.voxels(slot);
-  LittleEndianWriter to = payload();
+  LittleFieldWriter to = payload();
   index(to, header.index);
   to.u8(header.sides);
   to.zeros(3);
-  to.u32(std::bit_cast<std::uint32_t>(header.drift));
+  to.f32(header.drift);
   for (const std::int16_t distance : voxels.distance) to.u16(static_cast<std::uint16_t>(distance));
   for (const std::uint16_t weight : voxels.weight) to.u16(weight);
-  to.bytes(voxels.grey);
+  to.copy(voxels.grey);
   if (const LabelBlock* labels = map_.volume.labels(slot); labels != nullptr) {
     for (const LabelCounts& counts : labels->counts) {
       for (const std::uint16_t word : counts.words()) to.u16(word);
@@ -131,7 +132,7 @@ void MapWriter::writeBlock(std::uint32_t slot) {
 
 void MapWriter::writeFree() {
   for (std::size_t first = 0; first < free_.size(); first += kMostFree) {
-    LittleEndianWriter to = payload();
+    LittleFieldWriter to = payload();
     for (std::size_t i = first; i < std::min(first + kMostFree, free_.size()); ++i) {
       const BlockHeader& header = map_.volume.header(free_[i].slot);
       index(to, header.index);

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <span>
 
+#include "drivers/device/byte_fields.hpp"
 #include "drivers/recorded/recording_checksum.hpp"
 #include "estimator/core/random.hpp"
 #include "tests/drivers/recorded/asl_fixture.hpp"
@@ -131,7 +133,7 @@ TEST_CASE("a mapping step whose pixels are not what it says is refused with the 
        {Change{64, 15}, Change{64, -16}, Change{68, 1 << 30}, Change{72, 1}, Change{76, -1}, Change{40, 2}}) {
     Bytes bytes = sound;
     const std::size_t payload = at + kRecordHeaderBytes;
-    LittleEndianWriter(bytes.data() + payload + byte).i32(value);
+    LittleFieldWriter(std::span(bytes).subspan(payload + byte)).i32(value);
     record.payload_crc = crc32c(run, std::span(bytes).subspan(payload, paddedSize(record.length)));
     encode(record, run, std::span<std::uint8_t, kRecordHeaderBytes>(bytes.data() + at, kRecordHeaderBytes));
     const InputError error = refusal({bytes});
