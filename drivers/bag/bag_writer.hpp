@@ -26,7 +26,7 @@ struct BagWriterTopic {
 
 class BagWriter {
  public:
-  explicit BagWriter(std::string path) : path_(std::move(path)) {}
+  BagWriter() = default;
   BagWriter(const BagWriter&) = delete;
   BagWriter& operator=(const BagWriter&) = delete;
   virtual ~BagWriter() = default;
@@ -39,9 +39,6 @@ class BagWriter {
                      std::span<const std::uint8_t> body) = 0;
   /// Completes the file; nothing may be written afterwards.
   virtual void finish() = 0;
-
- protected:
-  std::string path_;
 };
 
 enum class McapPacking : std::uint8_t { kZstd, kNone };

@@ -352,7 +352,7 @@ Bytes McapFile::read(const BagEntry& entry) {
   const Bytes body = head.bytes(head.left());
   // rosbag2 can compress single messages. CDR never begins like a zstd frame.
   if (topics_[entry.topic].encoding != BagEncoding::kCdr || !isZstd(body)) return body;
-  if (!unpackZstdMessage(body, kMostUnpacked, message_)) fail(place, "a message's zstd data is damaged");
+  if (!unpackZstd(body, kMostUnpacked, message_)) fail(place, "a message's zstd data is damaged");
   return message_;
 }
 

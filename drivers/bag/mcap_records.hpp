@@ -23,7 +23,6 @@ enum class Op : std::uint8_t {
   kMessageIndex = 0x07,
   kChunkIndex = 0x08,
   kStatistics = 0x0B,
-  kSummaryOffset = 0x0E,
   kDataEnd = 0x0F,
 };
 

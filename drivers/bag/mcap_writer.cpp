@@ -39,7 +39,7 @@ class Records : public ByteBuffer {
 
 class McapWriter final : public BagWriter {
  public:
-  McapWriter(const std::string& path, McapPacking packing) : BagWriter(path), packing_(packing), file_(path) {
+  McapWriter(const std::string& path, McapPacking packing) : packing_(packing), file_(path) {
     write(mcap::kMagic);
     records_.add(Op::kHeader, [](Records& r) {
       r.text("ros2");

@@ -46,7 +46,7 @@ class Buffer : public ByteBuffer {
 /// The fields of each header are in alphabetical order, as rosbag writes them.
 class Writer final : public BagWriter {
  public:
-  explicit Writer(const std::string& path) : BagWriter(path), file_(path) {
+  explicit Writer(const std::string& path) : file_(path) {
     file_.write(bytesOf(kMagic));
     file_.write(bagRecord(0).bytes());
   }

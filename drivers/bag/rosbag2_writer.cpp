@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 class Rosbag2Writer final : public BagWriter {
  public:
   Rosbag2Writer(const std::string& folder, const std::string& name)
-      : BagWriter(folder),
+      : folder_(folder),
         file_(name + "_0.db3"),
         database_((fs::create_directories(folder), fs::path(folder) / file_).string(),
                   (fs::path(folder) / file_).string(), SqliteDatabase::Mode::kCreate) {
@@ -75,7 +75,7 @@ class Rosbag2Writer final : public BagWriter {
     insert_.reset();
     database_.execute("COMMIT;");
     database_.close();
-    const fs::path metadata = fs::path(path_) / "metadata.yaml";
+    const fs::path metadata = folder_ / "metadata.yaml";
     std::ofstream file(metadata, std::ios::binary);
     file << metadataText();
     file.close();
@@ -127,6 +127,7 @@ class Rosbag2Writer final : public BagWriter {
     return out;
   }
 
+  fs::path folder_;
   std::string file_;
   SqliteDatabase database_;
   std::optional<SqliteStatement> insert_;

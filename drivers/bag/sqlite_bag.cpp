@@ -44,7 +44,7 @@ class SqliteBag final : public BagFile {
     if (!body_->isBlob(0)) failRow(row, "`data` is not a blob");
     const std::span<const std::uint8_t> body = body_->blob(0);
     if (!isZstd(body)) return body;
-    if (!unpackZstdMessage(body, kMostMessage, unpacked_)) failRow(row, "its zstd data is damaged");
+    if (!unpackZstd(body, kMostMessage, unpacked_)) failRow(row, "its zstd data is damaged");
     return unpacked_;
   }
 

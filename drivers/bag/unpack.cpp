@@ -47,21 +47,6 @@ bool unpackGrowing(std::size_t most, std::vector<std::uint8_t>& out, Step&& step
   return true;
 }
 
-bool unpackZstd(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
-  const Zstd stream = makeZstd();
-  ZSTD_inBuffer in = {packed.data(), packed.size(), 0};
-  std::size_t left = 1;  // bytes of the frame still expected; 0 at its end
-  return unpackGrowing(most, out, [&](std::uint8_t* to, std::size_t room, std::size_t& written, bool& done) {
-    ZSTD_outBuffer target = {to, room, 0};
-    const std::size_t before = in.pos;
-    left = ZSTD_decompressStream(stream.get(), &target, &in);
-    if (ZSTD_isError(left) != 0) return false;
-    written = target.pos;
-    done = left == 0 && in.pos == in.size;
-    return done || written > 0 || in.pos > before;
-  });
-}
-
 bool unpackLz4(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
   LZ4F_dctx* made = nullptr;
   if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) != 0) return false;
@@ -138,6 +123,21 @@ void unpackFile(const std::string& packed, const std::string& to) {
 
 }  // namespace
 
+bool unpackZstd(std::span<const std::uint8_t> packed, std::size_t most, std::vector<std::uint8_t>& out) {
+  const Zstd stream = makeZstd();
+  ZSTD_inBuffer in = {packed.data(), packed.size(), 0};
+  std::size_t left = 1;  // bytes of the frame still expected; 0 at its end
+  return unpackGrowing(most, out, [&](std::uint8_t* to, std::size_t room, std::size_t& written, bool& done) {
+    ZSTD_outBuffer target = {to, room, 0};
+    const std::size_t before = in.pos;
+    left = ZSTD_decompressStream(stream.get(), &target, &in);
+    if (ZSTD_isError(left) != 0) return false;
+    written = target.pos;
+    done = left == 0 && in.pos == in.size;
+    return done || written > 0 || in.pos > before;
+  });
+}
+
 bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t size,
             std::vector<std::uint8_t>& out) {
   switch (packing) {
@@ -154,11 +154,6 @@ bool unpack(Packing packing, std::span<const std::uint8_t> packed, std::size_t s
       break;
   }
   return out.size() == size;
-}
-
-bool unpackZstdMessage(std::span<const std::uint8_t> packed, std::size_t most,
-                       std::vector<std::uint8_t>& out) {
-  return unpackZstd(packed, most, out);
 }
 
 bool isZstd(std::span<const std::uint8_t> bytes) {

@@ -22,8 +22,8 @@ constexpr std::uint64_t kMostUnpacked = std::uint64_t{1}
                           std::vector<std::uint8_t>& out);
 
 /// Decompresses one zstd message of unknown size, at most `most` bytes.
-[[nodiscard]] bool unpackZstdMessage(std::span<const std::uint8_t> packed, std::size_t most,
-                                     std::vector<std::uint8_t>& out);
+[[nodiscard]] bool unpackZstd(std::span<const std::uint8_t> packed, std::size_t most,
+                              std::vector<std::uint8_t>& out);
 
 /// True if the bytes start like a zstd frame.
 [[nodiscard]] bool isZstd(std::span<const std::uint8_t> bytes);
