@@ -13,12 +13,14 @@
 #include "firmware_host/outputs/run_folder/states_csv.hpp"
 #include "tests/firmware_host/exported_run.hpp"
 #include "tests/firmware_host/file_size_limit.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/skip_case.hpp"
 
 namespace swiftlet {
 namespace {
 
 using test::contains;
+using test::errorOf;
 using test::ExportedRun;
 using test::run;
 using test::textOf;
@@ -43,16 +45,6 @@ NavState perturbed(const NavState& state, int which, double step) {
   moved.T_world_body.translation += delta.segment<3>(3);
   moved.v_world_body += delta.tail<3>();
   return moved;
-}
-
-InputError errorOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error;
-  }
-  FAIL("no InputError");
-  return {"", 0, "", "", ""};
 }
 
 TEST_CASE("covariances are those of ROS's errors", "[export]") {

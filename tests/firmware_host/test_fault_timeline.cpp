@@ -3,19 +3,14 @@
 #include <array>
 #include <catch2/catch.hpp>
 
-#include "drivers/input/input_error.hpp"
 #include "firmware_host/lab/hil/fault_timeline.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet {
 namespace {
 
 std::string complaint(std::string_view text) {
-  try {
-    static_cast<void>(FaultTimeline::parse("faults.csv", text));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return test::messageOf([&] { (void)FaultTimeline::parse("faults.csv", text); });
 }
 
 constexpr Duration at(double seconds) { return Duration::fromSeconds(seconds); }

@@ -15,6 +15,7 @@
 #include "drivers/recorded/recording_checksum.hpp"
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "tests/mapping/volume_scene.hpp"
+#include "tests/support/input_error.hpp"
 
 using namespace swiftlet;           // NOLINT(google-build-using-namespace)
 using namespace swiftlet::testing;  // NOLINT(google-build-using-namespace)
@@ -106,12 +107,7 @@ KeptMapReport load(const std::string& bytes, Place& place) {
 
 std::string refusal(const std::string& bytes, const VolumeSettings& settings = sceneSettings()) {
   std::istringstream in(bytes);
-  try {
-    (void)checkKeptMap("kept.swm", in, settings);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return test::messageOf([&] { (void)checkKeptMap("kept.swm", in, settings); });
 }
 
 /// Few blocks, so that every byte can be tried.

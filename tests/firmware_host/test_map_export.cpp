@@ -21,6 +21,7 @@
 #include "firmware_host/outputs/map_files/kept_map.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 using namespace swiftlet;  // NOLINT(google-build-using-namespace)
@@ -195,13 +196,9 @@ TEST_CASE("an export that cannot be done leaves no folder") {
   const ScratchFolder folder("map_export_refused");
   const std::string kept = keptFlight(folder), out = folder.file("files");
   const auto refusal = [](const MapExportRequest& request) -> std::string {
-    try {
-      runMapExport(request);
-    } catch (const InputError& error) {
-      CHECK_FALSE(error.remedy.empty());
-      return error.what();
-    }
-    return "nothing";
+    const InputError error = test::errorOf([&] { runMapExport(request); });
+    CHECK_FALSE(error.remedy.empty());
+    return error.what();
   };
   CHECK_THAT(refusal({kept, out, 99}), Contains("--z"));
   CHECK_THAT(refusal({folder.path(), out, {}}), Contains("volume.swm"));

@@ -26,6 +26,7 @@
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/mapping/volume_crossings.hpp"
 #include "tests/mapping/volume_scene.hpp"
+#include "tests/support/input_error.hpp"
 
 using namespace swiftlet;           // NOLINT(google-build-using-namespace)
 using namespace swiftlet::testing;  // NOLINT(google-build-using-namespace)
@@ -253,13 +254,9 @@ TEST_CASE("colours grow lighter with the distance, millimetres stay in their 16 
 }
 
 std::string refusal(const MapSliceRequest& request) {
-  try {
-    static_cast<void>(runMapSlice(request));
-  } catch (const InputError& error) {
-    CHECK_FALSE(error.remedy.empty());
-    return error.what();
-  }
-  return "nothing";
+  const InputError error = test::errorOf([&] { (void)runMapSlice(request); });
+  CHECK_FALSE(error.remedy.empty());
+  return error.what();
 }
 
 /// A wall seen once, and free blocks beside it.

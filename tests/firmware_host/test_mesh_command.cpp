@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/trajectory_file.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/files/line_file.hpp"
@@ -18,6 +17,7 @@
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/run_summary.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
@@ -25,6 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using test::messageOf;
 using test::run;
 using test::summaryIn;
 using test::textOf;
@@ -73,12 +74,7 @@ std::vector<Row> readFrames(const std::string& folder) {
 
 /// What the input error says; empty without one.
 std::string complaint(const MeshRequest& request) {
-  try {
-    static_cast<void>(runMesh(request, Settings{}));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return messageOf([&] { (void)runMesh(request, Settings{}); });
 }
 
 std::string recordedLog() { return (fs::path(SWIFTLET_TEST_DATA) / "euroc_mh01_4s").string(); }

@@ -11,12 +11,14 @@
 #include "estimator/core/random.hpp"
 #include "firmware_host/outputs/map_files/ply_file.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 using test::contains;
+using test::messageOf;
 using test::textOf;
 
 TriangleMesh randomMesh(std::uint32_t vertices, std::uint32_t faces) {
@@ -41,12 +43,7 @@ const std::string kBody = "0 0 0\n1 0 0\n0 1.5 0\n3 0 1 2 7\n";
 
 /// The message that reading ends with; empty when it succeeds.
 std::string complaint(const std::string& bytes) {
-  try {
-    (void)readPlyText("m.ply", bytes);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return messageOf([&] { (void)readPlyText("m.ply", bytes); });
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {

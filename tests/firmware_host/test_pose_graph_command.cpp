@@ -10,18 +10,19 @@
 #include <string>
 #include <vector>
 
-#include "drivers/input/input_error.hpp"
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/lab/modules/g2o_file.hpp"
 #include "firmware_host/lab/modules/pose_graph_run.hpp"
 #include "mapping/pose_graph/pose_error.hpp"
 #include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
+using test::messageOf;
 using test::run;
 using test::textOf;
 
@@ -55,12 +56,7 @@ std::string packed(const std::string& text) {
 }
 
 std::string complaint(const PoseGraphRequest& request) {
-  try {
-    static_cast<void>(runPoseGraph(request));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return messageOf([&] { (void)runPoseGraph(request); });
 }
 
 TEST_CASE("pose-graph solves a file, keeps ids and edges, and writes the same bytes again") {

@@ -22,12 +22,14 @@
 #include "firmware_host/outputs/map_files/map_files.hpp"
 #include "tests/firmware_host/exported_run.hpp"
 #include "tests/firmware_host/ros1_messages.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/skip_case.hpp"
 
 namespace swiftlet {
 namespace {
 
 using test::contains;
+using test::errorOf;
 using test::ExportedRun;
 using test::run;
 using test::textOf;
@@ -427,13 +429,10 @@ TEST_CASE("a bag that cannot be written whole is not left behind", "[export]") {
   // A bag has no place for times before 1 ns.
   RunFolder early = folder;
   for (TrajectoryPoint& point : early.odometry) point.stamp.ns -= folder.odometry.front().stamp.ns;
-  try {
-    writeBag(BagForm::kRos1, file, [&](MessageBag& bag) { writeRunBag(early, {}, {}, bag); });
-    FAIL("no InputError");
-  } catch (const InputError& error) {
-    CHECK(contains(error.file, "odometry.tum"));
-    CHECK(error.field == "stamp");
-  }
+  const InputError error = errorOf(
+      [&] { writeBag(BagForm::kRos1, file, [&](MessageBag& bag) { writeRunBag(early, {}, {}, bag); }); });
+  CHECK(contains(error.file, "odometry.tum"));
+  CHECK(error.field == "stamp");
 }
 
 TEST_CASE("a log's messages are those of ROS's own packages", "[export]") {

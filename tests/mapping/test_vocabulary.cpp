@@ -9,6 +9,7 @@
 #include "firmware_host/inputs/vocabulary/vocabulary_file.hpp"
 #include "mapping/place/hamming.hpp"
 #include "mapping/place/vocabulary_training.hpp"
+#include "tests/support/input_error.hpp"
 
 using namespace swiftlet;
 
@@ -148,12 +149,7 @@ TEST_CASE("ORB-SLAM's text is read, with the parent-child distances deciding the
 
 TEST_CASE("Bad vocabulary texts are refused with line and field") {
   const auto refusal = [](std::string text) {
-    try {
-      (void)readVocabularyBytes("voc.txt", text);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return test::messageOf([&] { (void)readVocabularyBytes("voc.txt", text); });
   };
   const std::string good = kText;
   CHECK(refusal(good).empty());

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 namespace swiftlet::test {
 
@@ -16,6 +17,13 @@ inline std::string textOf(const std::filesystem::path& path) {
 
 inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
+}
+
+inline bool anyContains(const std::vector<std::string>& lines, const std::string& part) {
+  for (const std::string& line : lines) {
+    if (contains(line, part)) return true;
+  }
+  return false;
 }
 
 }  // namespace swiftlet::test

@@ -72,14 +72,4 @@ void writeBytes(const std::string& path, const std::vector<std::uint8_t>& bytes)
   REQUIRE(file.good());
 }
 
-InputError refusalOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error;
-  }
-  FAIL("no InputError");
-  return {"", 0, "", "", ""};
-}
-
 }  // namespace swiftlet::test

@@ -4,13 +4,12 @@
 #include <catch2/catch.hpp>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "drivers/bag/bag_file.hpp"
 #include "drivers/bag/bag_writer.hpp"
-#include "drivers/input/input_error.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet::test {
 
@@ -44,6 +43,10 @@ std::vector<PlainMessage> readBack(const std::string& path);
 std::vector<std::uint8_t> bytesOf(const std::string& path);
 void writeBytes(const std::string& path, const std::vector<std::uint8_t>& bytes);
 
-InputError refusalOf(const std::function<void()>& call);
+/// Same as errorOf().
+template <typename Call>
+InputError refusalOf(const Call& call) {
+  return errorOf(call);
+}
 
 }  // namespace swiftlet::test

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "drivers/calibration/calibration.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet::test {
@@ -44,25 +45,6 @@ struct KalibrTexts {
     return parseKalibrCalibration({"chain.yaml", chain}, {"imu.yaml", imu}, options);
   }
 };
-
-/// The error that `call` throws; the test fails when it throws none.
-template <typename Call>
-InputError errorOf(const Call& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error;
-  }
-  FAIL("no InputError");
-  return {"", 0, "", "", ""};
-}
-
-inline bool anyContains(const std::vector<std::string>& lines, const std::string& part) {
-  for (const std::string& line : lines) {
-    if (contains(line, part)) return true;
-  }
-  return false;
-}
 
 /// The four rows of a transform as YAML flow lists.
 inline std::string flowRows(const SE3& T) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "drivers/recorded/open_log.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
@@ -80,23 +81,5 @@ inline constexpr const char* kKalibrIllustration =
 inline constexpr const char* kKalibrImu =
     "update_rate: 200.0\naccelerometer_noise_density: 2.0e-03\naccelerometer_random_walk: 3.0e-03\n"
     "gyroscope_noise_density: 1.6968e-04\ngyroscope_random_walk: 1.9393e-05\n";
-
-template <typename Call>
-InputError errorOf(const Call& call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error;
-  }
-  FAIL("no InputError");
-  return {"", 0, "", "", ""};
-}
-
-inline bool anyContains(const std::vector<std::string>& lines, const std::string& part) {
-  for (const std::string& line : lines) {
-    if (contains(line, part)) return true;
-  }
-  return false;
-}
 
 }  // namespace swiftlet::test

@@ -40,12 +40,7 @@ struct DepthFolder {
 
 std::string refusal(const DepthFolder& log) {
   LogWarnings warnings;
-  try {
-    const DepthImages images(log.temp.path().string(), warnings);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return test::messageOf([&] { const DepthImages images(log.temp.path().string(), warnings); });
 }
 
 TEST_CASE("depth images come in metres at their stamp, with the camera that took them", "[depth_images]") {

@@ -3,8 +3,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "drivers/input/input_error.hpp"
 #include "drivers/recorded/position_file.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet {
 namespace {
@@ -42,14 +42,7 @@ TEST_CASE("geodetic positions become metres east, north and up", "[positions]") 
 }
 
 TEST_CASE("what is no position is named", "[positions]") {
-  const auto message = [](const std::string& text) {
-    try {
-      (void)read(text);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto message = [](const std::string& text) { return test::messageOf([&] { (void)read(text); }); };
   CHECK(message("1.0,2,3\n2.0,2,3\n").find("positions:1: row: ") != std::string::npos);
   CHECK(message("t,lat,lon,alt\n1.0,472,8,0\n").find("latitude: is beyond 90 degrees") != std::string::npos);
   CHECK(message("1.0,a,2,3\n").find("`a` is not a number") != std::string::npos);

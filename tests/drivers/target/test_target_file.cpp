@@ -4,6 +4,7 @@
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/target/target_file.hpp"
+#include "tests/support/input_error.hpp"
 
 using namespace swiftlet;
 
@@ -41,13 +42,9 @@ TEST_CASE("what is written is read again") {
 
 TEST_CASE("a wrong board names its line, field and remedy") {
   const auto complaint = [](const std::string& text) {
-    try {
-      (void)parseTarget("t.yaml", text);
-    } catch (const InputError& error) {
-      CHECK_FALSE(error.remedy.empty());
-      return error.file + ":" + std::to_string(error.line) + ":" + error.field + ":" + error.message;
-    }
-    return std::string("none");
+    const InputError error = test::errorOf([&] { (void)parseTarget("t.yaml", text); });
+    CHECK_FALSE(error.remedy.empty());
+    return error.file + ":" + std::to_string(error.line) + ":" + error.field + ":" + error.message;
   };
   const std::string type = "target_type: 'aprilgrid'\n";
   CHECK(complaint(type + "tagCols: 6\ntagRows: 6\ntagSize: 88\ntagSpacing: 0.3\n") ==

@@ -14,6 +14,7 @@
 #include "firmware_host/lab/calibrate/imu_noise/imu_noise_run.hpp"
 #include "firmware_host/lab/calibrate/imu_noise/noise_fit.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet {
 namespace {
@@ -249,12 +250,7 @@ TEST_CASE("Wrong stamps and dead axes are refused") {
         csv.add(reading);
       }
     }
-    try {
-      static_cast<void>(measureImuNoise(path));
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return test::messageOf([&] { (void)measureImuNoise(path); });
   };
   CHECK_THAT(complaint(true, false),
              Catch::Contains(path + ": timestamp: jumps from 1000000000.020 to 1000950400.025 s"));

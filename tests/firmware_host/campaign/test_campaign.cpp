@@ -7,12 +7,12 @@
 #include <fstream>
 #include <thread>
 
-#include "drivers/input/input_error.hpp"
 #include "firmware_host/files/whole_file.hpp"
 #include "firmware_host/lab/campaign/campaign_report.hpp"
 #include "firmware_host/lab/campaign/campaign_run.hpp"
 #include "firmware_host/lab/campaign/child_process.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/input_error.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
@@ -34,12 +34,7 @@ class Logs {
     return parseCampaign(folder() / "logs.yaml", text);
   }
   [[nodiscard]] std::string error(const std::string& text) const {
-    try {
-      static_cast<void>(parse(text));
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "none";
+    return test::messageOf([&] { (void)parse(text); });
   }
 
  private:

@@ -3,9 +3,9 @@
 #include <catch2/catch.hpp>
 #include <string>
 
-#include "drivers/input/input_error.hpp"
 #include "firmware_host/inputs/devices/input_topics.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet {
 namespace {
@@ -21,12 +21,7 @@ Settings topicSettings() {
 }
 
 std::string topicRefusal(const Settings& settings) {
-  try {
-    LiveInput input(settings, euroc());
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return test::messageOf([&] { const LiveInput input(settings, euroc()); });
 }
 
 TEST_CASE("a driver's preset names what the settings do not") {

@@ -9,10 +9,10 @@
 #include <map>
 #include <thread>
 
-#include "drivers/input/input_error.hpp"
 #include "drivers/simulated/rig_presets.hpp"
 #include "firmware_host/inputs/devices/live_input.hpp"
 #include "firmware_host/inputs/devices/sensor_threads.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet {
 namespace {
@@ -39,12 +39,7 @@ Settings vehicle() {
 
 /// "key: remedy", or empty: taken.
 std::string refusal(const Settings& settings, const Calibration& calibration) {
-  try {
-    const LiveInput input(settings, calibration);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return {};
+  return test::messageOf([&] { const LiveInput input(settings, calibration); });
 }
 
 TEST_CASE("a trigger is known to the flight whichever device gives its edges") {

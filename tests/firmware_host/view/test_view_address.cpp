@@ -4,6 +4,7 @@
 
 #include "drivers/input/input_error.hpp"
 #include "firmware_host/outputs/view/view_address.hpp"
+#include "tests/support/input_error.hpp"
 
 namespace swiftlet {
 namespace {
@@ -23,14 +24,10 @@ TEST_CASE("what is no address is refused with the option's name and a remedy") {
   for (const char* text :
        {"data/euroc_mh01_20s", "127.0.0.1:66000", "127.0.0.1:-1", "127.0.0.1:x", "[::1", "1.2.3.4.5"}) {
     CAPTURE(text);
-    CHECK_THROWS_AS(parseViewAddress(text), InputError);
-    try {
-      parseViewAddress(text);
-    } catch (const InputError& error) {
-      CHECK(error.file == "--view");
-      CHECK(error.field == text);
-      CHECK_FALSE(error.remedy.empty());
-    }
+    const InputError error = test::errorOf([&] { parseViewAddress(text); });
+    CHECK(error.file == "--view");
+    CHECK(error.field == text);
+    CHECK_FALSE(error.remedy.empty());
   }
 }
 
