@@ -1,10 +1,10 @@
 #include "tests/architecture/source_tree.hpp"
+#include "tests/support/text.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cstdio>
-#include <fstream>
 #include <iterator>
 #include <set>
 #include <sstream>
@@ -88,7 +88,7 @@ bool isLeftOut(const std::string& path) {
 }
 
 SourceFile readFile(const fs::path& file) {
-  return parseSource(fs::relative(file, projectRoot()).generic_string(), readWhole(file));
+  return parseSource(fs::relative(file, projectRoot()).generic_string(), test::textOf(file));
 }
 
 template <typename Accept>
@@ -192,11 +192,6 @@ std::vector<SourceFile> readTextFiles() {
   std::erase_if(files, [](const SourceFile& file) { return isLeftOut(file.path); });
   sortByPath(files);
   return files;
-}
-
-std::string readWhole(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 }  // namespace swiftlet::architecture

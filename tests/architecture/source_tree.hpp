@@ -43,7 +43,4 @@ struct Violation {
 /// recorded data is left out.
 [[nodiscard]] std::vector<SourceFile> readTextFiles();
 
-/// The whole file as one string; empty when it does not exist.
-[[nodiscard]] std::string readWhole(const std::filesystem::path& file);
-
 }  // namespace swiftlet::architecture

@@ -7,14 +7,17 @@
 
 #include "firmware_host/settings/registry.hpp"
 #include "tests/architecture/source_tree.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet::architecture;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
+using swiftlet::test::textOf;
+
 /// Names of the initialised members of struct `name` in a header.
 std::set<std::string> membersOf(const std::string& path, const std::string& name) {
-  const SourceFile file = parseSource(path, readWhole(projectRoot() / path));
+  const SourceFile file = parseSource(path, textOf(projectRoot() / path));
   std::set<std::string> members;
   bool inside = false;
   static const std::regex kMember(R"(^\s+(?:int|double|bool|std::string)\s+([a-z0-9_]+)\s*=[^=])");

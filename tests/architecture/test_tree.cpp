@@ -9,10 +9,13 @@
 
 #include "tests/architecture/named_includes.hpp"
 #include "tests/architecture/rules.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet::architecture;  // NOLINT(google-build-using-namespace)
 
 namespace {
+
+using swiftlet::test::textOf;
 
 constexpr std::size_t kMaxFileLines = 600;
 constexpr std::size_t kMaxReadmeLines = 100;
@@ -44,7 +47,7 @@ std::string listsAbove(const SourceFile& file) {
   std::string lists;
   for (std::filesystem::path folder = std::filesystem::path(file.path).parent_path(); !folder.empty();
        folder = folder.parent_path()) {
-    lists += readWhole(projectRoot() / folder / "CMakeLists.txt");
+    lists += textOf(projectRoot() / folder / "CMakeLists.txt");
   }
   return lists;
 }
@@ -137,7 +140,7 @@ TEST_CASE("files include what they name") {
 TEST_CASE("files stay readable in length") {
   std::vector<Violation> found;
   for (const SourceFile& file : readSources(roomsAndTests())) append(found, checkLength(file, kMaxFileLines));
-  const SourceFile readme = parseSource("README.md", readWhole(projectRoot() / "README.md"));
+  const SourceFile readme = parseSource("README.md", textOf(projectRoot() / "README.md"));
   REQUIRE(!readme.lines.empty());
   append(found, checkLength(readme, kMaxReadmeLines));
   requireNone(found);

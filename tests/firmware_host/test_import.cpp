@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "drivers/input/input_error.hpp"
 #include "drivers/recorded/imu_file.hpp"
@@ -20,6 +19,7 @@
 #include "tests/logs/log_data.hpp"
 #include "tests/support/input_error.hpp"
 #include "tests/support/skip_case.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -259,8 +259,7 @@ TEST_CASE("what cannot be imported is named, and nothing is left", "[import]") {
   };
   request.video = scratch.file("none.mp4");
   CHECK(message().find("none.mp4: cannot be read as a video") != std::string::npos);
-  std::ifstream whole(*video, std::ios::binary);
-  Bytes bytes{std::istreambuf_iterator<char>(whole), std::istreambuf_iterator<char>()};
+  const Bytes bytes = test::bytesOf(*video);
   request.video = scratch.file("cut.mp4");
   std::ofstream(request.video, std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size() / 2));

@@ -4,8 +4,6 @@
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
 
@@ -14,6 +12,7 @@
 #include "firmware_host/smoothing/keyframe_reader.hpp"
 #include "firmware_host/smoothing/map_keeper.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -107,8 +106,7 @@ std::string kept(const std::string& folder, bool finished = true,
     if (finished) keeper.finish();
   }
   REQUIRE(lost.count() == 0);
-  std::ifstream file(folder + "/" + kKeyframeFile, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return test::textOf(folder + "/" + kKeyframeFile);
 }
 
 struct Counts {
@@ -211,8 +209,7 @@ TEST_CASE("a run with the largest stamps of a log is read whole", "[files]") {
     keeper.addKeyframe(frame, stateOf(0), noiseOf(0));
     keeper.finish();
   }
-  std::ifstream file(folder.file(kKeyframeFile), std::ios::binary);
-  const Counts counts = countsIn({std::istreambuf_iterator<char>(file), {}});
+  const Counts counts = countsIn(test::textOf(folder.file(kKeyframeFile)));
   CHECK(counts.cut.empty());
   CHECK(counts.samples == kSamplesEach);
   CHECK(counts.keyframes == 1);

@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -27,6 +26,7 @@
 #include "tests/mapping/volume_crossings.hpp"
 #include "tests/mapping/volume_scene.hpp"
 #include "tests/support/input_error.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet;           // NOLINT(google-build-using-namespace)
 using namespace swiftlet::testing;  // NOLINT(google-build-using-namespace)
@@ -70,12 +70,8 @@ void keep(const std::string& path, const VoxelVolume& volume) {
   static_cast<void>(writeKeptMap(path, out, {volume}));
 }
 
+using swiftlet::test::bytesOf;
 using swiftlet::test::run;
-
-std::vector<std::uint8_t> bytesOf(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 std::vector<std::uint8_t> readColours(const std::string& path, int width, int height) {
   png_image image{};

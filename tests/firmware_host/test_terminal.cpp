@@ -22,6 +22,7 @@
 #include "firmware_host/realtime/console.hpp"
 #include "firmware_host/realtime/stage_timer.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -87,8 +88,7 @@ void checkComplete(const std::string& run) {
   CHECK(linesOf(run + "/states.csv") > 1);
   // What a message would look like in a file that has a standard stream's number.
   for (const char* name : {"/odometry.tum", "/states.csv", "/events.log"}) {
-    std::ifstream text(run + name);
-    const std::string all{std::istreambuf_iterator<char>(text), std::istreambuf_iterator<char>()};
+    const std::string all = test::textOf(run + name);
     CHECK(all.find("reserved memory") == std::string::npos);
     CHECK(all.find("written to") == std::string::npos);
   }

@@ -7,13 +7,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "estimator/core/random.hpp"
 #include "tests/fuzz/fuzz_targets.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::fuzz {
 namespace {
@@ -27,11 +26,6 @@ std::vector<fs::path> filesIn(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;
-}
-
-std::string readText(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 std::size_t place(Random& random, const std::string& text) {
@@ -67,7 +61,7 @@ int run(const fs::path& corpus, int mutations) {
   for (const NamedTarget& target : targets()) {
     std::size_t inputs = 0;
     for (const fs::path& file : filesIn(corpus / target.name)) {
-      const std::string original = readText(file);
+      const std::string original = test::textOf(file);
       target.run(original);
       Random random(original.size(), inputs);
       for (int i = 0; i < mutations; ++i) {

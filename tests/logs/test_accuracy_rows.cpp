@@ -6,13 +6,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/accuracy_rows.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -78,8 +77,7 @@ int runWithoutLogs(const std::string& options, std::string& said) {
   const std::string command = "SWIFTLET_DATA='" + folder.path() + "' '" SWIFTLET_ACCURACY_TABLE "' " +
                               options + " >'" + folder.file("said") + "' 2>&1";
   const int status = std::system(command.c_str());
-  std::ifstream file(folder.file("said"));
-  said.assign(std::istreambuf_iterator<char>(file), {});
+  said = test::textOf(folder.file("said"));
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 

@@ -7,7 +7,6 @@
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -16,9 +15,12 @@
 #include "firmware_host/runs/replay_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::textOf;
 
 constexpr int kDefaultCuts = 6;
 
@@ -30,13 +32,6 @@ std::optional<std::string> chosenLog() {
 int chosenCuts() {
   const char* text = std::getenv("SWIFTLET_CAUSALITY_CUTS");
   return text != nullptr ? std::atoi(text) : kDefaultCuts;
-}
-
-std::string textOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 std::vector<std::string> linesOf(const std::string& path) {

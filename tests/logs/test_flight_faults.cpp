@@ -9,8 +9,6 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <cstdlib>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -23,10 +21,13 @@
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/support/long_run.hpp"
+#include "tests/support/text.hpp"
 #include "tests/support/view_client.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::textOf;
 
 enum class Fault : std::uint8_t { kThrows, kReturns, kStalls, kStuck };
 
@@ -95,13 +96,6 @@ struct Outcome {
   double ended = 0;  ///< s after the fault
   bool logged = false;
 };
-
-std::string textOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 Outcome fly(Scene& scene, const ScratchFolder& folder) {
   ReplayRequest request;

@@ -19,9 +19,12 @@
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
 #include "tests/support/long_run.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::textOf;
 
 constexpr double kForGood = 1e9;
 constexpr Duration kHour{3'600'000'000'000};
@@ -39,13 +42,6 @@ struct Jump {
   double until = kForGood;
   Duration by;
 };
-
-std::string textOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// The short log as a recording, in its own order.
 void recordWithJumps(const std::string& folder, const std::vector<Jump>& jumps) {

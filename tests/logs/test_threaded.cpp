@@ -13,9 +13,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <new>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -31,9 +29,12 @@
 #include "tests/logs/log_data.hpp"
 #include "tests/sanitized.hpp"
 #include "tests/support/long_run.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
+
+using test::textOf;
 
 /// Sanitizers slow everything down tenfold: a second of the log then, at a fifth of its speed, and nothing
 /// said about losses, which they cause.
@@ -45,13 +46,6 @@ int chosenRuns() { return longOr(20, 4); }
 /// Of the short log.
 constexpr std::uint64_t kImages = kSanitized ? 42 : 160;  // of both cameras
 constexpr Stamp kLastImage{kSanitized ? 1'403'636'585'763'555'584 : 1'403'636'588'713'555'456};
-
-std::string textOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// The same names with the same bytes, and at least one.
 bool sameFiles(const std::string& one, const std::string& other) {

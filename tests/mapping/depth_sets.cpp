@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
@@ -11,6 +10,7 @@
 #include "drivers/calibration/calibration.hpp"
 #include "mapping/depth/stereo_rectification.hpp"
 #include "tests/logs/log_data.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::depth_sets {
 namespace {
@@ -31,11 +31,9 @@ cv::Mat readImage(const std::filesystem::path& without_extension) {
 
 /// `intrinsics: [fx, fy, cx, cy]` of the depth camera.
 PinholeIntrinsics depthCamera(const std::string& folder, const cv::Mat& image) {
-  std::ifstream file(folder + "/sensor.yaml");
-  std::stringstream text;
-  text << file.rdbuf();
+  const std::string text = test::textOf(folder + "/sensor.yaml");
   const std::string key = "intrinsics: [";
-  std::string values = text.str().substr(text.str().find(key) + key.size());
+  std::string values = text.substr(text.find(key) + key.size());
   std::replace(values.begin(), values.end(), ',', ' ');
   std::istringstream numbers(values);
   PinholeIntrinsics camera;

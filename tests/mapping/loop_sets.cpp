@@ -13,18 +13,12 @@
 
 #include "drivers/calibration/calibration.hpp"
 #include "tests/mapping/loop_sets_depth.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::loop_sets {
 namespace {
 
 constexpr double kRevisitOverlap = 0.4;
-
-std::string readText(const std::string& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 SE3 poseFrom(std::istream& in) {
   Eigen::Vector3d t;
@@ -49,8 +43,8 @@ std::optional<ImageSet> readKimera(const std::string& data) {
   if (!std::filesystem::exists(folder + "poses.txt")) return std::nullopt;
   ImageSet set;
   set.name = "kimera_lcd";
-  const std::string left = readText(folder + "sensorLeft.yaml");
-  const std::string right = readText(folder + "sensorRight.yaml");
+  const std::string left = test::textOf(folder + "sensorLeft.yaml");
+  const std::string right = test::textOf(folder + "sensorRight.yaml");
   // The IMU does not matter here: EuRoC's own densities.
   const std::string imu =
       "sensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]\nrate_hz: "

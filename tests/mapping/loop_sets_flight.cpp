@@ -16,6 +16,7 @@
 #include "mapping/place/place_extractor.hpp"
 #include "tests/mapping/loop_sets.hpp"
 #include "tests/mapping/loop_sets_depth.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::loop_sets {
 namespace {
@@ -105,12 +106,10 @@ void setFlightKinds(ImageSet& set, double min_seconds) {
 
 // As they lie in the folder, where every image has one.
 bool readDepths(ImageSet& set, const std::vector<std::int64_t>& stamps, const std::string& folder) {
-  std::ifstream yaml(folder + "/sensor.yaml");
-  std::stringstream text;
-  text << yaml.rdbuf();
-  const std::size_t at = text.str().find("intrinsics: [");
+  const std::string text = test::textOf(folder + "/sensor.yaml");
+  const std::size_t at = text.find("intrinsics: [");
   if (at == std::string::npos) return false;
-  std::istringstream intrinsics(text.str().substr(at + 13));
+  std::istringstream intrinsics(text.substr(at + 13));
   for (int i = 0; i < 4; ++i) {
     char comma = 0;
     intrinsics >> set.depth_camera[i] >> comma;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "mapping/volume/volume_integrator.hpp"
 #include "tests/logs/log_data.hpp"
 #include "tests/support/skip_case.hpp"
+#include "tests/support/text.hpp"
 
 using namespace swiftlet;
 
@@ -46,8 +46,7 @@ std::vector<Frame> framesOf(const std::string& folder) {
 std::vector<float> depthOf(const std::string& folder, int number) {
   char name[40];
   std::snprintf(name, sizeof(name), "/depth/frame-%06d.png", number);
-  std::ifstream file(folder + name, std::ios::binary);
-  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
+  const std::vector<std::uint8_t> bytes = test::bytesOf(folder + name);
   std::vector<std::uint16_t> units(kCamera.pixels());
   ImageSize found;
   REQUIRE(ImageDecoder::decode16(bytes, {kCamera.width, kCamera.height}, units.data(), found) ==

@@ -7,11 +7,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/support/skip_case.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -19,8 +19,7 @@ namespace {
 /// Exit code of a shell command; its output goes to `said`.
 int codeOf(const ScratchFolder& folder, const std::string& command, std::string& said) {
   const int status = std::system((command + " >'" + folder.file("said") + "' 2>&1").c_str());
-  std::ifstream file(folder.file("said"));
-  said.assign(std::istreambuf_iterator<char>(file), {});
+  said = test::textOf(folder.file("said"));
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // What stands in a file, and in a line.
 
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -11,6 +12,12 @@ namespace swiftlet::test {
 
 /// All bytes of a file; empty if it cannot be read.
 inline std::string textOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+/// The same as bytes.
+inline std::vector<std::uint8_t> bytesOf(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }

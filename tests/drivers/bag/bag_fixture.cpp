@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <fstream>
-#include <iterator>
 #include <map>
 
 namespace swiftlet::test {
@@ -59,11 +58,6 @@ std::vector<PlainMessage> readBack(BagFile& bag) {
 std::vector<PlainMessage> readBack(const std::string& path) {
   const auto bag = openBag(path);
   return readBack(*bag);
-}
-
-std::vector<std::uint8_t> bytesOf(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 void writeBytes(const std::string& path, const std::vector<std::uint8_t>& bytes) {

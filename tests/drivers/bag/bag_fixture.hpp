@@ -10,6 +10,7 @@
 #include "drivers/bag/bag_file.hpp"
 #include "drivers/bag/bag_writer.hpp"
 #include "tests/support/input_error.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::test {
 
@@ -40,7 +41,6 @@ void write(BagWriter& writer, const std::vector<PlainMessage>& messages);
 std::vector<PlainMessage> readBack(BagFile& bag);
 std::vector<PlainMessage> readBack(const std::string& path);
 
-std::vector<std::uint8_t> bytesOf(const std::string& path);
 void writeBytes(const std::string& path, const std::vector<std::uint8_t>& bytes);
 
 /// Same as errorOf().

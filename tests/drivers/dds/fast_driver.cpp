@@ -20,8 +20,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 #include <thread>
@@ -33,6 +31,7 @@
 #include "drivers/recorded/imu_file.hpp"
 #include "tests/drivers/dds/fast_peer.hpp"
 #include "tests/drivers/dds/test_topics.hpp"
+#include "tests/support/text.hpp"
 
 namespace {
 
@@ -62,11 +61,6 @@ struct Options {
   [[nodiscard]] double number(const char* name) const { return std::atof(text.at(name).c_str()); }
   [[nodiscard]] bool is(const char* name, const char* value) const { return text.at(name) == value; }
 };
-
-std::vector<std::uint8_t> readBytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 /// What is played: stamps of the images in ns from the first one, pictures and samples.
 class Content {
@@ -118,12 +112,12 @@ class Content {
   /// A picture's bytes: of the log, black PNG before it.
   [[nodiscard]] const std::vector<std::uint8_t>& picture(std::size_t camera, std::int64_t index) {
     if (index < 0 && !black_.empty()) return picture_ = black_;
-    if (index >= 0) return picture_ = readBytes(files_.at(camera).at(static_cast<std::size_t>(index)));
+    if (index >= 0) return picture_ = bytesOf(files_.at(camera).at(static_cast<std::size_t>(index)));
     const auto file = std::filesystem::temp_directory_path() / ("black_" + std::to_string(getpid()) + ".png");
     const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width) *
                                            static_cast<std::size_t>(height));
     writePng8(file.string(), pixels.data(), width, height);
-    black_ = readBytes(file.string());
+    black_ = bytesOf(file);
     std::filesystem::remove(file);
     return black_;
   }

@@ -8,9 +8,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cstdlib>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <thread>
@@ -21,6 +19,7 @@
 #include "tests/drivers/gstreamer/feed_element.hpp"
 #include "tests/drivers/gstreamer/frames.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -59,8 +58,7 @@ std::vector<std::uint8_t> bytesOf(const std::string& source, const std::string& 
   gst_object_unref(bus);
   gst_element_set_state(made, GST_STATE_NULL);
   gst_object_unref(made);
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return test::bytesOf(file);
 }
 
 std::vector<std::uint8_t> greyOf(PipelineSource& source) {

@@ -8,13 +8,13 @@
 #include <cstdint>
 #include <fstream>
 #include <numbers>
-#include <span>
 #include <sstream>
 #include <stdexcept>
 
 #include "drivers/image/image_decoder.hpp"
 #include "drivers/recorded/image_files.hpp"
 #include "estimator/core/random.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet::test {
 namespace {
@@ -46,13 +46,6 @@ void writeCsv(const fs::path& path, const std::string& header, const std::vector
     for (std::size_t i = 0; i < row.size(); ++i) file << (i > 0 ? "," : "") << row[i];
     file << '\n';
   }
-}
-
-std::string readText(const fs::path& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 void writeText(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
@@ -131,7 +124,7 @@ class WrongLog {
     const std::string name = fmt::format("cam{}", camera);
     const fs::path source = from_ / fmt::format("cam{}", is("cameras_swapped") ? 1 - camera : camera);
     fs::create_directories(to_ / name / "data");
-    std::string yaml = readText(from_ / name / "sensor.yaml");
+    std::string yaml = textOf(from_ / name / "sensor.yaml");
     if (is("focal_1.25") || is("focal_0.8")) {
       const double ratio = is("focal_0.8") ? 0.8 : 1.25;
       std::istringstream list(yaml.substr(yaml.find('[', yaml.find("intrinsics:")) + 1));
@@ -180,15 +173,12 @@ class WrongLog {
   }
 
   void writeScaled(const fs::path& image, const fs::path& out, double gain) {
-    std::ifstream file(image, std::ios::binary);
-    const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    const std::span<const std::uint8_t> view(reinterpret_cast<const std::uint8_t*>(bytes.data()),
-                                             bytes.size());
+    const std::vector<std::uint8_t> bytes = bytesOf(image);
     ImageSize size{0, 0};
     ImageDecoder decoder;
-    static_cast<void>(decoder.decode(view, {1, 1}, pixels_.data(), size));
+    static_cast<void>(decoder.decode(bytes, {1, 1}, pixels_.data(), size));
     pixels_.resize(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height));
-    if (decoder.decode(view, size, pixels_.data(), size) != DecodeResult::kOk)
+    if (decoder.decode(bytes, size, pixels_.data(), size) != DecodeResult::kOk)
       throw std::runtime_error(image);
     for (std::uint8_t& pixel : pixels_) pixel = static_cast<std::uint8_t>(std::lround(gain * pixel));
     writeJpeg(out, pixels_.data(), size.width, size.height, 92);

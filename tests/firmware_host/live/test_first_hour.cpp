@@ -16,6 +16,7 @@
 #include "firmware_host/runs/doctor_run.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/firmware_host/without_rights.hpp"
+#include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
@@ -52,10 +53,7 @@ Said run(const std::vector<std::string>& arguments, bool as_nobody = false) {
   }
   int status = 0;
   waitpid(child, &status, 0);
-  std::ifstream said(file);
-  std::ostringstream text;
-  text << said.rdbuf();
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, text.str()};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, test::textOf(file)};
 }
 
 /// Settings of a vehicle whose devices are files of a folder that need not be there.
