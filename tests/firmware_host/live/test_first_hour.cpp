@@ -14,6 +14,7 @@
 
 #include "firmware_host/commands/program.hpp"
 #include "firmware_host/runs/doctor_run.hpp"
+#include "tests/firmware_host/run_program.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
 #include "tests/firmware_host/without_rights.hpp"
 #include "tests/support/text.hpp"
@@ -25,13 +26,6 @@ struct Said {
   int code = -1;
   std::string text;  ///< both streams, in the order of their lines
 };
-
-int runArguments(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "swiftlet");
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  return runProgram(static_cast<int>(pointers.size()), pointers.data());
-}
 
 /// The program in a process of its own, as it is or as a user without any right.
 Said run(const std::vector<std::string>& arguments, bool as_nobody = false) {
@@ -47,7 +41,7 @@ Said run(const std::vector<std::string>& arguments, bool as_nobody = false) {
       constexpr uid_t kNobody = 65534;
       if (setgid(kNobody) != 0 || setuid(kNobody) != 0) _exit(99);
     }
-    const int code = runArguments(arguments);
+    const int code = test::run(arguments);
     std::fflush(nullptr);
     _exit(code);
   }
