@@ -19,12 +19,14 @@
 #include "tests/drivers/gstreamer/feed_element.hpp"
 #include "tests/drivers/gstreamer/frames.hpp"
 #include "tests/firmware_host/scratch_folder.hpp"
+#include "tests/support/statistics.hpp"
 #include "tests/support/text.hpp"
 
 namespace swiftlet {
 namespace {
 
 using test::awaitFrame;
+using test::largestDifference;
 using test::pipeline;
 
 struct Format {
@@ -74,13 +76,6 @@ std::vector<std::uint8_t> greyOf(PipelineSource& source) {
     grey.insert(grey.end(), images[0].row(y), images[0].row(y) + images[0].width);
   }
   return grey;
-}
-
-int largestDifference(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
-  REQUIRE(a.size() == b.size());
-  int largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(a[i] - b[i]));
-  return largest;
 }
 
 TEST_CASE("The grey of each format is the luma of the bytes that GStreamer writes", "[gstreamer]") {

@@ -17,10 +17,12 @@
 #include "drivers/image/grey_reader.hpp"
 #include "drivers/image/ros_encoding.hpp"
 #include "tests/drivers/image/ffmpeg.hpp"
+#include "tests/support/statistics.hpp"
 
 namespace swiftlet {
 namespace {
 
+using test::largestDifference;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr int kEncodedWidth = 324;  // libv4l wants whole groups of four
@@ -41,13 +43,6 @@ Bytes greyOf(const char* fourcc, const Bytes& bytes, int width = kEncodedWidth) 
     for (int y = 0; y < kEncodedHeight; ++y) out.insert(out.end(), view.row(y), view.row(y) + width);
   }
   return out;
-}
-
-int largestDifference(const Bytes& a, const Bytes& b) {
-  REQUIRE(a.size() == b.size());
-  int worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a[i] - b[i]));
-  return worst;
 }
 
 TEST_CASE("FFmpeg's pixels of every layout become the grey of its own conversion", "[image]") {

@@ -1,6 +1,7 @@
 // A whole EuRoC folder: order, pictures, truth, relatives.
 
 #include "tests/drivers/recorded/asl_fixture.hpp"
+#include "tests/support/statistics.hpp"
 
 namespace swiftlet {
 namespace {
@@ -83,10 +84,7 @@ TEST_CASE("JPEG files and names that are not the stamp are read", "[asl]") {
   const Delivered got = readAll(*source);
   REQUIRE(got.frames.size() == 6);
   CHECK(source->warnings().empty());
-  const std::vector<std::uint8_t> truth = test::pattern(64, 48, 2);
-  int worst = 0;
-  for (std::size_t i = 0; i < truth.size(); ++i)
-    worst = std::max(worst, std::abs(truth[i] - got.pictures[2][i]));
+  const int worst = test::largestDifference(test::pattern(64, 48, 2), got.pictures[2]);
   CHECK(worst > 0);
   CHECK(worst < 160);  // the pattern wraps around, where JPEG rings
 }
