@@ -40,7 +40,12 @@ void writeBytes(const fs::path& path, const std::vector<std::uint8_t>& bytes) {
 
 namespace {
 
-std::vector<std::uint8_t> encode(png_image& image, const void* pixels) {
+std::vector<std::uint8_t> encode(const void* pixels, int width, int height, png_uint_32 format) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(width);
+  image.height = static_cast<png_uint_32>(height);
+  image.format = format;
   png_alloc_size_t size = 0;
   REQUIRE(png_image_write_to_memory(&image, nullptr, &size, 0, pixels, 0, nullptr) != 0);
   std::vector<std::uint8_t> bytes(size);
@@ -52,21 +57,11 @@ std::vector<std::uint8_t> encode(png_image& image, const void* pixels) {
 }  // namespace
 
 std::vector<std::uint8_t> encodePng(const std::vector<std::uint8_t>& pixels, int width, int height) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(width);
-  image.height = static_cast<png_uint_32>(height);
-  image.format = PNG_FORMAT_GRAY;
-  return encode(image, pixels.data());
+  return encode(pixels.data(), width, height, PNG_FORMAT_GRAY);
 }
 
 std::vector<std::uint8_t> encodePng16(const std::vector<std::uint16_t>& pixels, int width, int height) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(width);
-  image.height = static_cast<png_uint_32>(height);
-  image.format = PNG_FORMAT_LINEAR_Y;
-  return encode(image, pixels.data());
+  return encode(pixels.data(), width, height, PNG_FORMAT_LINEAR_Y);
 }
 
 std::vector<std::uint8_t> encodeJpeg(const std::vector<std::uint8_t>& pixels, int width, int height) {
