@@ -29,11 +29,11 @@ endfunction()
 
 # swiftlet_join_units(<target> [<alone>...]): the rooms of logs, program and tests are many short files that include the
 # same headers; joined, they are parsed once in twenty, of tests, which are longer, once in eight: no unit takes much
-# more than a minute. The estimator's files stay alone: what is inlined where could change the last bit of a result.
-# So do the files <alone>.
+# more than a minute. The files that compute results (estimator, mapping, simulation) stay alone: what is inlined
+# where could change a last bit, and does in simulated samples. So do the files <alone>.
 function(swiftlet_join_units target)
   file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
-  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(bag|calibration|dds|input|recorded|simulated|v4l2)|firmware_host|tests)(/|$)")
+  if(SWIFTLET_JOINED_UNITS AND room MATCHES "^(drivers/(bag|calibration|dds|input|recorded|v4l2)|firmware_host|tests)(/|$)")
     set(batch 20)
     if(room MATCHES "^tests/")
       set(batch 8)
