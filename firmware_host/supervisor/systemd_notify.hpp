@@ -3,7 +3,8 @@
 // its library.
 //
 // Without NOTIFY_SOCKET in the environment, every call does nothing. Nothing blocks, allocates or fails: a
-// message that systemd does not take is lost; for essential ones the call says so, or they are repeated. One thread.
+// message that systemd does not take is lost; for essential ones the call says so, or they are repeated. One
+// thread.
 
 #include <cstdint>
 #include <optional>
