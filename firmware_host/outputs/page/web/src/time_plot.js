@@ -94,6 +94,9 @@ const shown = (value) => (value == null ? '' : Number(value).toPrecision(4));
 
 const kClick = 3; // px that the pointer may move in a click
 
+/** Drags that zoom in time. */
+export const kZoomDrag = { x: true, y: false, dist: kClick + 1 };
+
 /**
  * Calls take(t) where somebody clicks. uPlot swallows the event `click` if the page moved under the pointer, as it does
  * when the legends get their first values.
@@ -159,7 +162,7 @@ export class TimePlot {
           { label: plot.x_label, labelSize: 18, size: 34, font: '11px system-ui', labelFont: '11px system-ui' },
           { label: plot.y_label, labelSize: 18, size: 58, font: '11px system-ui', labelFont: '11px system-ui' },
         ],
-        cursor: { sync: { key }, drag: { x: true, y: false, dist: kClick + 1 }, bind: zoomBy() },
+        cursor: { sync: { key }, drag: kZoomDrag, bind: zoomBy() },
         hooks: { setScale: [spreadZoom(key)] },
       },
       this.data(),

@@ -3,7 +3,7 @@
 import uPlot from 'uplot';
 import * as colours from './colours.js';
 import { Moment } from './moment.js';
-import { follow, setDataOf, spreadZoom, takeClicks, unfollow, zoomBy } from './time_plot.js';
+import { follow, kZoomDrag, setDataOf, spreadZoom, takeClicks, unfollow, zoomBy } from './time_plot.js';
 
 const kLane = 20; // px
 
@@ -40,7 +40,7 @@ export class Timeline {
           { size: 120, font: '11px system-ui', splits: () => middle, values: () => lanes, grid: { show: false }, ticks: { show: false } },
         ],
         series: [{}, { paths: () => null, points: { show: false } }],
-        cursor: { sync: { key: this.key }, y: false, points: { show: false }, bind: zoomBy() },
+        cursor: { sync: { key: this.key }, y: false, points: { show: false }, drag: kZoomDrag, bind: zoomBy() },
         hooks: { draw: [(u) => this.draw(u)], setCursor: [(u) => this.point(u)], setScale: [spreadZoom(this.key)] },
       },
       this.data(),
