@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "drivers/bag/ros1_records.hpp"
 #include "drivers/device/byte_fields.hpp"
 #include "tests/drivers/bag/bag_fixture.hpp"
 
@@ -121,6 +122,30 @@ TEST_CASE("a ROS 1 bag that its recorder did not close is read to its last messa
   damaged[second - 1] = 0xFF;  // of the field's length
   test::writeBytes(file, damaged);
   CHECK(refusalOf([&] { (void)openBag(file); }).field.starts_with("byte "));
+}
+
+TEST_CASE("a closed ROS 1 bag needs no indexes of its chunks", "[ros1_bag]") {
+  const BagFolder folder;
+  const std::string file = folder.file("a.bag");
+  const std::vector<PlainMessage> messages = someMessages(20, 100'000);  // three chunks
+  test::write(*makeRos1Writer(file), messages);
+  const std::vector<std::uint8_t> whole = test::bytesOf(file);
+  std::vector<std::uint8_t> bytes(whole.begin(), whole.begin() + ros1::kMagic.size());
+  for (auto at = bytes.size(); at < whole.size();) {
+    const ros1::Head head = ros1::headOf(std::span(whole).subspan(at));
+    const std::span record = std::span(whole).subspan(at, head.size + head.length);
+    if (head.op != ros1::Op::kIndex) bytes.insert(bytes.end(), record.begin(), record.end());
+    at += record.size();
+  }
+  REQUIRE(bytes.size() < whole.size());
+  const std::size_t tail = placeOf(bytes, "index_pos=") + 10;
+  const std::uint64_t removed = whole.size() - bytes.size();
+  LittleFieldWriter(std::span(bytes).subspan(tail))
+      .u64(LittleFieldReader(std::span(bytes).subspan(tail)).u64() - removed);
+  test::writeBytes(file, bytes);
+  const auto bag = openBag(file);
+  CHECK(readBack(*bag) == messages);
+  CHECK(bag->warnings().empty());
 }
 
 TEST_CASE("an index that points to the connection before its message is followed", "[ros1_bag]") {
