@@ -173,7 +173,7 @@ void McapFile::takeStatistics(Bytes content, std::uint64_t place) {
 }
 
 void McapFile::endData(std::uint64_t at) {
-  if (finished_) fail(at, "a record extends past the data");
+  if (finished_) fail(at, "a record is damaged or extends past the data");
   endEarly(at);
 }
 
